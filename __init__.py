@@ -1,0 +1,79 @@
+"""roofbench: an evaluation-first benchmark for building detection from airborne LiDAR and orthoimagery.
+
+The short public API; everything is imported when it is first used, so ``import roofbench`` is cheap.
+
+>>> import roofbench as rb
+>>> evaluation = rb.evaluate(rb.read_footprints("detected.gpkg"), rb.read_footprints("register.gpkg"))  # doctest: +SKIP
+>>> evaluation.object.quality  # doctest: +SKIP
+0.93
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .detectors.base import Detector, Step
+    from .detectors.registry import make_detector
+    from .evaluators.base import Evaluation, Evaluator, Index
+    from .evaluators.registry import make_evaluator
+    from .scenes.errors import RoofbenchError
+    from .scenes.footprints import Footprints
+    from .scenes.parameters import parameter
+    from .scenes.points import PointCloud
+    from .scenes.raster import Elevation, Grid, Image
+    from .scenes.scene import Scene
+    from .scenes.vector_files import read_footprints, write_footprints
+
+#: Public name to the module that defines it.
+_HOMES = {
+    "Detector": "detectors.base",
+    "Elevation": "scenes.raster",
+    "Evaluation": "evaluators.base",
+    "Evaluator": "evaluators.base",
+    "Footprints": "scenes.footprints",
+    "Grid": "scenes.raster",
+    "Image": "scenes.raster",
+    "Index": "evaluators.base",
+    "PointCloud": "scenes.points",
+    "RoofbenchError": "scenes.errors",
+    "Scene": "scenes.scene",
+    "Step": "detectors.base",
+    "make_detector": "detectors.registry",
+    "make_evaluator": "evaluators.registry",
+    "parameter": "scenes.parameters",
+    "read_footprints": "scenes.vector_files",
+    "write_footprints": "scenes.vector_files",
+}
+
+__all__ = [
+    "Detector",
+    "Elevation",
+    "Evaluation",
+    "Evaluator",
+    "Footprints",
+    "Grid",
+    "Image",
+    "Index",
+    "PointCloud",
+    "RoofbenchError",
+    "Scene",
+    "Step",
+    "make_detector",
+    "make_evaluator",
+    "parameter",
+    "read_footprints",
+    "write_footprints",
+]
+__version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+    raise AttributeError(f"module 'roofbench' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

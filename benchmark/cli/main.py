@@ -1,0 +1,64 @@
+"""The command ``roofbench``: its commands, exit codes and how errors are told.
+
+Exit codes: 0 good; 1 regression; 2 usage or bad input; 3 some runs failed; 4 nothing measured or not comparable.
+Data goes to standard output, messages and progress to standard error. Modules of the commands import what they need
+when they run, so that ``roofbench evaluate`` does not wait for libraries that it does not use.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from ...scenes.errors import RoofbenchError
+from . import evaluate
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="roofbench",
+    help="Evaluation-first benchmark for building detection from airborne LiDAR and orthoimagery.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+app.command("evaluate")(evaluate.evaluate)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from ... import __version__
+
+        typer.echo(f"roofbench {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line; errors of roofbench end with one sentence and exit code 2."""
+    try:
+        app()
+    except RoofbenchError as error:
+        typer.secho(f"Error: {error}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        typer.echo("Stopped.", err=True)
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader of a pipe (head, less) has gone: not an error. Keep Python from flushing into the closed pipe.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+if __name__ == "__main__":
+    main()

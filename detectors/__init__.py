@@ -1,0 +1,1 @@
+"""What finds buildings: scene in, footprints out."""

@@ -1,0 +1,70 @@
+"""Detectors: what finds buildings in a scene.
+
+A *detector* is a frozen, keyword-only dataclass whose fields are its parameters; `Detector.detect` turns a scene into
+footprints. It sees measurements only (`Scene.for_detection`) and draws every random number from the generator it is
+given, so that the same seed gives the same footprints on any machine and with any number of workers.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from ..scenes.errors import UnsupportedError
+from ..scenes.footprints import Footprints
+from ..scenes.parameters import Parameterised
+from ..scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Detector", "Step"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One intermediate result that a person can look at.
+
+    Attributes
+    ----------
+    name : str
+        Short, fit for a file name: ``"03-lines"``.
+    caption : str
+        One sentence that says what is seen.
+    draw : callable
+        Draws it on an empty matplotlib figure.
+    """
+
+    name: str
+    caption: str
+    draw: Callable[[Figure], None]
+
+
+class Detector(Parameterised, ABC):
+    """Base of all detectors: derive, decorate with ``@dataclass(frozen=True, kw_only=True)``, set `name`.
+
+    Attributes
+    ----------
+    name : str
+        Name on the command line and in tables.
+    requires : tuple of str
+        Inputs without which it is skipped: ``points``, ``image``, ``colour``, ``nir``, ``dem``.
+    stochastic : bool
+        Whether different seeds give different footprints.
+    """
+
+    name: ClassVar[str]
+    requires: ClassVar[tuple[str, ...]] = ("points",)
+    stochastic: ClassVar[bool] = False
+
+    @abstractmethod
+    def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
+        """Return the footprints of the buildings in a scene; none is a valid result."""
+
+    def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
+        """Yield the intermediate results of the same detection, for ``roofbench detect --steps``."""
+        raise UnsupportedError(f"the detector {self.name!r} shows no intermediate steps")

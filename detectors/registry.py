@@ -1,0 +1,37 @@
+"""The detectors that can be named: built in, installed (entry points ``roofbench.detectors``) or from a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..scenes.names import Registry, parse_selection
+from .base import Detector
+
+__all__ = ["DETECTORS", "make_detector"]
+
+DETECTORS = Registry(
+    "detector",
+    "roofbench.detectors",
+    Detector,
+    {
+        "ndsm": "detectors.ndsm:NDSM",
+    },
+)
+
+
+def make_detector(selection: str | Detector, parameters: Mapping[str, Any] | None = None) -> Detector:
+    """Return a detector by name, by ``name[parameter=value]`` or by ``file.py:Class``; an instance passes through.
+
+    Raises
+    ------
+    UnknownNameError
+        No such detector; the nearest name is given.
+    ParameterError
+        Unknown parameter or value outside its range.
+    """
+    if isinstance(selection, Detector):
+        return selection
+    name, values = parse_selection(selection)
+    detector: Detector = DETECTORS.get(name).build({**values, **(parameters or {})})
+    return detector

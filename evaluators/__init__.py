@@ -1,0 +1,1 @@
+"""How two footprint sets are compared."""

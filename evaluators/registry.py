@@ -1,0 +1,29 @@
+"""The evaluators that can be named: built in, installed (entry points ``roofbench.evaluators``) or from a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..scenes.names import Registry, parse_selection
+from .base import Evaluator
+
+__all__ = ["EVALUATORS", "make_evaluator"]
+
+EVALUATORS = Registry(
+    "evaluator",
+    "roofbench.evaluators",
+    Evaluator,
+    {
+        "threshold-free": "evaluators.threshold_free.evaluator:ThresholdFree",
+    },
+)
+
+
+def make_evaluator(selection: str | Evaluator, parameters: Mapping[str, Any] | None = None) -> Evaluator:
+    """Return an evaluator by name, by ``name[parameter=value]`` or by ``file.py:Class``; an instance passes through."""
+    if isinstance(selection, Evaluator):
+        return selection
+    name, values = parse_selection(selection)
+    evaluator: Evaluator = EVALUATORS.get(name).build({**values, **(parameters or {})})
+    return evaluator

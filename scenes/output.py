@@ -1,0 +1,79 @@
+"""Output files appear whole or not at all.
+
+`whole_file` and `whole_folder` hand out a temporary path beside the target and move it into place only when the block
+ends without an error, so an interrupted command leaves what was there before.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .errors import OutputError
+
+__all__ = ["whole_file", "whole_folder"]
+
+
+def _check_target(path: Path, overwrite: bool) -> None:
+    if path.exists() and not overwrite:
+        raise OutputError(f"{path} exists already: add --overwrite (in Python: overwrite=True) or name another file")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path} cannot be written: there is no folder {path.parent}")
+    if not os.access(path.parent, os.W_OK):
+        raise OutputError(f"{path} cannot be written: no permission to write in {path.parent}")
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
+    """Yield a temporary path with the same name; on success it (and its side files) replace `path`.
+
+    Side files are files that a driver writes beside the one it was told: ``.dbf``, ``.shx``, ``.aux.xml``.
+    """
+    target = Path(path)
+    _check_target(target, overwrite)
+    if target.is_dir():
+        raise OutputError(f"{target} is a folder: name a file")
+    with _scratch(target) as scratch:
+        yield scratch / target.name
+        written = sorted(scratch.iterdir(), key=lambda item: item.name == target.name)
+        if not written:
+            raise OutputError(f"{target} was not written")
+        for item in written:
+            item.replace(target.parent / item.name)
+
+
+@contextmanager
+def whole_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
+    """Yield a temporary folder; on success it replaces `path`."""
+    target = Path(path)
+    _check_target(target, overwrite)
+    if target.exists() and not target.is_dir():
+        raise OutputError(f"{target} is a file: name a folder")
+    with _scratch(target) as scratch:
+        new = scratch / "new"
+        new.mkdir()
+        yield new
+        if target.exists():
+            target.replace(scratch / "old")
+        new.replace(target)
+
+
+@contextmanager
+def _scratch(target: Path) -> Iterator[Path]:
+    try:
+        folder = Path(tempfile.mkdtemp(prefix=f".{target.name[:40]}.", dir=target.parent))
+    except OSError as error:
+        raise OutputError(f"{target} cannot be written: {error.strerror}") from error
+    folder.chmod(0o755)  # noqa: S103 - mkdtemp makes it private, results are for the user's group too
+    try:
+        yield folder
+    except OSError as error:
+        if isinstance(error, OutputError) or error.filename is None:
+            raise
+        raise OutputError(f"{target} cannot be written: {error.strerror}") from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

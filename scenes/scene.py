@@ -1,0 +1,200 @@
+"""Scenes: one place with what was measured there and what is true of it.
+
+A *scene* has a name, an extent in metres of a projected CRS, and any of: points, orthoimage, DEM (bare earth),
+reference footprints and evaluation area (where the reference is complete). Each is read when it is first asked for.
+What a detector gets is `Scene.for_detection`: measurements only, neither reference nor classification.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import shapely
+
+from .errors import InputError, MissingInputError
+from .footprints import Footprints
+from .points import PointCloud
+from .raster import Elevation, Grid, Image
+
+__all__ = ["Scene"]
+
+#: What a detector may require, and how it is named to people.
+INPUTS: Mapping[str, str] = {
+    "points": "a point cloud",
+    "image": "an orthoimage",
+    "colour": "an orthoimage with red, green and blue",
+    "nir": "an orthoimage with a near-infrared band",
+    "dem": "a bare-earth DEM",
+}
+
+
+class Scene:
+    """A place with its measurements and its truth.
+
+    Parameters
+    ----------
+    name : str
+    extent : tuple of float
+        ``(xmin, ymin, xmax, ymax)``, metres.
+    crs : str, optional
+        Authority code or WKT.
+    points, image, dem, reference, area
+        The value, or a function without arguments that reads it when it is first asked for, or None.
+    content_hash : str or function, optional
+        Digest of everything the scene holds; computed from the arrays when not given.
+    facts : mapping, optional
+        Provenance that JSON can hold: source, licence, generator parameters.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        extent: tuple[float, float, float, float],
+        *,
+        crs: str | None = None,
+        points: PointCloud | Callable[[], PointCloud | None] | None = None,
+        image: Image | Callable[[], Image | None] | None = None,
+        dem: Elevation | Callable[[], Elevation | None] | None = None,
+        reference: Footprints | Callable[[], Footprints | None] | None = None,
+        area: shapely.Geometry | Callable[[], shapely.Geometry | None] | None = None,
+        content_hash: str | Callable[[], str] | None = None,
+        facts: Mapping[str, Any] | None = None,
+    ) -> None:
+        xmin, ymin, xmax, ymax = map(float, extent)
+        if not (xmax > xmin and ymax > ymin):
+            raise InputError(f"scene {name!r}: the extent {extent} is not [xmin, ymin, xmax, ymax] of an area")
+        self.name = name
+        self.extent = (xmin, ymin, xmax, ymax)
+        self.crs = crs
+        self.facts = dict(facts or {})
+        self._sources: dict[str, Any] = {
+            "points": points,
+            "image": image,
+            "dem": dem,
+            "reference": reference,
+            "area": area,
+        }
+        self._content_hash = content_hash
+
+    def __repr__(self) -> str:
+        held = [name for name, source in self._sources.items() if source is not None]
+        return f"<Scene {self.name}: {', '.join(held) or 'empty'}>"
+
+    def _get(self, name: str) -> Any:
+        value = self._sources[name]
+        if callable(value):
+            value = self._sources[name] = value()
+        return value
+
+    @property
+    def points(self) -> PointCloud | None:
+        """Point cloud, or None."""
+        value: PointCloud | None = self._get("points")
+        return value
+
+    @property
+    def image(self) -> Image | None:
+        """Orthoimage, or None."""
+        value: Image | None = self._get("image")
+        return value
+
+    @property
+    def dem(self) -> Elevation | None:
+        """Bare-earth elevation, or None."""
+        value: Elevation | None = self._get("dem")
+        return value
+
+    @property
+    def reference(self) -> Footprints | None:
+        """Reference footprints, or None."""
+        value: Footprints | None = self._get("reference")
+        return value
+
+    @property
+    def area(self) -> shapely.Geometry | None:
+        """Polygon inside which the reference is complete, or None when it is complete everywhere."""
+        return self._get("area")
+
+    @property
+    def evaluation_grid(self) -> Grid | None:
+        """Grid of the orthoimage, on which pixel indices are counted; None without an image."""
+        return self.image.grid if self.image is not None else None
+
+    @property
+    def content_hash(self) -> str:
+        """Digest that changes when anything that the scene holds changes."""
+        if callable(self._content_hash):
+            self._content_hash = self._content_hash()
+        if self._content_hash is None:
+            self._content_hash = self._digest()
+        return self._content_hash
+
+    def lacks(self, requires: tuple[str, ...]) -> str | None:
+        """Return why a detector with these requirements cannot run here, or None when it can."""
+        for need in requires:
+            if need not in INPUTS:
+                raise InputError(f"{need!r} is nothing that a scene can hold: {', '.join(INPUTS)}")
+            if not self._holds(need):
+                return f"scene {self.name!r} has not {INPUTS[need]}"
+        return None
+
+    def _holds(self, need: str) -> bool:
+        if need in ("points", "dem"):
+            return self._get(need) is not None
+        image = self.image
+        if image is None or need == "image":
+            return image is not None
+        return image.is_colour if need == "colour" else need in image.bands
+
+    def require(self, requires: tuple[str, ...]) -> None:
+        """Raise `MissingInputError` when the scene lacks one of the inputs."""
+        reason = self.lacks(requires)
+        if reason:
+            raise MissingInputError(reason)
+
+    def for_detection(self) -> Scene:
+        """Return the scene as a detector may see it: no reference, no area, no classification, no generator facts."""
+
+        def points() -> PointCloud | None:
+            cloud = self.points
+            return None if cloud is None else cloud.unclassified()
+
+        held = self._sources
+        return Scene(
+            self.name,
+            self.extent,
+            crs=self.crs,
+            points=points if held["points"] is not None else None,
+            image=(lambda: self.image) if held["image"] is not None else None,
+            dem=(lambda: self.dem) if held["dem"] is not None else None,
+            content_hash=lambda: self.content_hash,
+        )
+
+    def _digest(self) -> str:
+        digest = hashlib.sha256(repr((self.extent, self.crs)).encode())
+
+        def add(*arrays: Any) -> None:
+            for array in arrays:
+                if array is not None:
+                    digest.update(repr((array.dtype.str, array.shape)).encode())
+                    digest.update(np.ascontiguousarray(array).tobytes())
+
+        if (cloud := self.points) is not None:
+            add(cloud.x, cloud.y, cloud.z, cloud.return_number, cloud.number_of_returns)
+            add(cloud.intensity, cloud.classification, cloud.colour)
+        if (image := self.image) is not None:
+            digest.update(repr((image.bands, image.grid)).encode())
+            add(image.values, image.valid)
+        if (dem := self.dem) is not None:
+            digest.update(repr(dem.grid).encode())
+            add(dem.values)
+        if (reference := self.reference) is not None:
+            for wkb in shapely.to_wkb(reference.polygons):
+                digest.update(wkb)
+            digest.update(reference.building_codes.tobytes())
+        if self.area is not None:
+            digest.update(shapely.to_wkb(self.area))
+        return digest.hexdigest()
