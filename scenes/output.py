@@ -68,7 +68,7 @@ def _scratch(target: Path) -> Iterator[Path]:
         folder = Path(tempfile.mkdtemp(prefix=f".{target.name[:40]}.", dir=target.parent))
     except OSError as error:
         raise OutputError(f"{target} cannot be written: {error.strerror}") from error
-    folder.chmod(0o755)  # noqa: S103 - mkdtemp makes it private, results are for the user's group too
+    folder.chmod(0o755)  # mkdtemp makes it private; results are for the group too
     try:
         yield folder
     except OSError as error:

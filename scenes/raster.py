@@ -135,7 +135,7 @@ class Elevation:
     grid: Grid
 
     def sample(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
-        """Return bilinear elevation at points, shape of `x`; clamped to the outer cell centres, NaN beside unknown cells."""
+        """Return bilinear elevation at points, shape of `x`; clamped at the border, NaN beside unknown cells."""
         row, column = self.grid.to_pixel(x, y)
         row = np.clip(row - 0.5, 0, self.grid.rows - 1)
         column = np.clip(column - 0.5, 0, self.grid.columns - 1)
