@@ -1,0 +1,17 @@
+"""Slow obvious oracle of the lowest supported point per cell."""
+
+import numpy as np
+
+
+def lowest_surface(x, y, z, grid):
+    row, column = (np.floor(value).astype(int) for value in grid.to_pixel(x, y))
+    lowest = np.full(grid.shape, np.nan)
+    for r in range(grid.rows):
+        for c in range(grid.columns):
+            near = (abs(row - r) <= 2) & (abs(column - c) <= 2) & (row >= 0) & (row < grid.rows)
+            near &= (column >= 0) & (column < grid.columns)
+            for height in sorted(z[(row == r) & (column == c)]):
+                if np.sum(abs(z[near] - height) < 1.0) >= 3:
+                    lowest[r, c] = height
+                    break
+    return lowest
