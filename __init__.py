@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .evaluators.base import Evaluation, Evaluator, Index
     from .evaluators.registry import make_evaluator
     from .scenes.errors import RoofbenchError
+    from .scenes.folder import open_scene, save_scene
     from .scenes.footprints import Footprints
     from .scenes.parameters import parameter
     from .scenes.points import PointCloud
@@ -42,8 +43,10 @@ _HOMES = {
     "Step": "detectors.base",
     "make_detector": "detectors.registry",
     "make_evaluator": "evaluators.registry",
+    "open_scene": "scenes.folder",
     "parameter": "scenes.parameters",
     "read_footprints": "scenes.vector_files",
+    "save_scene": "scenes.folder",
     "write_footprints": "scenes.vector_files",
 }
 
@@ -62,8 +65,10 @@ __all__ = [
     "Step",
     "make_detector",
     "make_evaluator",
+    "open_scene",
     "parameter",
     "read_footprints",
+    "save_scene",
     "write_footprints",
 ]
 __version__ = "0.1.0"

@@ -14,7 +14,7 @@ from .errors import CRSError
 if TYPE_CHECKING:
     from pyproj import CRS
 
-__all__ = ["common_crs", "crs_label", "parse_crs", "require_metric", "same_crs"]
+__all__ = ["common_crs", "crs_label", "crs_text", "parse_crs", "require_metric", "same_crs"]
 
 
 @lru_cache(maxsize=64)
@@ -41,6 +41,13 @@ def crs_label(text: str | None) -> str:
     return ":".join(authority) if authority else str(crs.name)
 
 
+def crs_text(crs: CRS) -> str:
+    """Return the text by which roofbench keeps the horizontal part: ``EPSG:28992`` where there is a code, else WKT."""
+    horizontal = _horizontal(crs.to_wkt())
+    authority = horizontal.to_authority(min_confidence=100)
+    return ":".join(authority) if authority else str(horizontal.to_wkt())
+
+
 @lru_cache(maxsize=64)
 def _horizontal(text: str) -> CRS:
     """Return the horizontal part of a compound CRS, else the CRS itself."""
@@ -51,7 +58,9 @@ def _horizontal(text: str) -> CRS:
 
 
 def require_metric(text: str | None, where: str) -> None:
-    """Raise `CRSError` unless the CRS is projected, with axes in metres; None (not known) passes.
+    """Raise `CRSError` unless the CRS is projected, with axes (and heights, if it names them) in metres.
+
+    None (not known) passes.
 
     Parameters
     ----------
@@ -74,6 +83,14 @@ def require_metric(text: str | None, where: str) -> None:
             f"{where}: {crs_label(text)} is in {unit.unit_name}, metres are needed: reproject it, "
             "for instance with ogr2ogr -t_srs, gdalwarp -t_srs or pdal's filters.reprojection"
         )
+    whole = parse_crs(text)
+    for part in whole.sub_crs_list if whole.is_compound else [whole]:
+        for axis in part.axis_info:
+            if axis.direction in ("up", "down") and abs(axis.unit_conversion_factor - 1.0) > 1e-9:
+                raise CRSError(
+                    f"{where}: its heights are in {axis.unit_name} ({part.name}), metres are needed: convert them, "
+                    "for instance with pdal's filters.reprojection or filters.assign"
+                )
 
 
 def same_crs(first: str, second: str) -> bool:

@@ -184,12 +184,15 @@ def _write_ogr(
     *,
     append: bool,
 ) -> None:
+    import pyogrio
     import pyogrio.raw
     from pyogrio.errors import DataSourceError
 
     kinds = {str(kind) for kind in np.unique([shape.geom_type for shape in geometries])} or {"Polygon"}
     kind = kinds.pop() if len(kinds) == 1 else "Multi" + min(kinds, key=len)
     values = {name: _storable(column) for name, column in columns.items()}
+    # A GeoPackage stores when it was written; a fixed date makes equal content equal bytes, which scenes rely on.
+    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": "2000-01-01T00:00:00.000Z"})
     try:
         pyogrio.raw.write(
             file,
@@ -206,6 +209,8 @@ def _write_ogr(
         )
     except DataSourceError as error:
         raise OutputError(f"{file.name} cannot be written: {error}") from error
+    finally:
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": None})
 
 
 def _write_parquet(

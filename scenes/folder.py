@@ -1,0 +1,305 @@
+"""Scene folders: a scene on disk that any GIS opens.
+
+::
+
+    scene.toml       manifest: name, CRS, units, extent, source, licence, and of each file its SHA-256 and origin
+    points.laz       laser points
+    ortho.tif        orthoimage, bands named
+    dem.tif          bare-earth elevation, NaN where not known
+    reference.gpkg   reference footprints with building_id
+    area.gpkg        where the reference is complete, when it is not everywhere
+
+All files but the manifest are optional and in the CRS of the scene. A folder is opened without reading any of them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from .errors import InputError
+from .footprints import Footprints
+from .output import whole_folder
+from .points import PointCloud
+from .raster import Elevation, Image
+from .scene import Scene
+
+__all__ = ["FILES", "MANIFEST", "changed_files", "open_scene", "read_manifest", "save_scene", "seal_scene"]
+
+MANIFEST = "scene.toml"
+#: What a scene holds, and the file that holds it.
+FILES: Mapping[str, str] = {
+    "points": "points.laz",
+    "image": "ortho.tif",
+    "dem": "dem.tif",
+    "reference": "reference.gpkg",
+    "area": "area.gpkg",
+}
+#: Version of the layout; raised when a folder of before cannot be read any more.
+_FORMAT = 1
+
+
+def open_scene(path: str | os.PathLike[str]) -> Scene:
+    """Open a scene folder; points and rasters are read when they are first asked for.
+
+    Parameters
+    ----------
+    path : path
+        The folder, or its ``scene.toml``.
+
+    Raises
+    ------
+    InputError
+        No folder, no or a broken manifest, a file of the manifest that is not there.
+    """
+    folder, manifest = read_manifest(path)
+    files: dict[str, Mapping[str, Any]] = manifest.get("files", {})
+    sources: dict[str, Any] = {}
+    for kind in files:
+        sources[kind] = _reader(kind, folder / FILES[kind], manifest)
+    facts: dict[str, Any] = {key: manifest[key] for key in ("source", "licence", "notes", "derived") if key in manifest}
+    facts.update(manifest.get("facts", {}))
+    return Scene(
+        manifest["name"],
+        tuple(manifest["extent"]),
+        crs=manifest.get("crs"),
+        facts=facts,
+        content_hash=lambda: _content_hash(folder, manifest),
+        **sources,
+    )
+
+
+def save_scene(scene: Scene, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a scene as a folder, whole or not at all.
+
+    Coordinates of points are rounded to 1 mm. What the scene's `facts` say of ``source`` (text), ``licence`` (text),
+    ``notes`` (list of texts) and ``derived`` (kind to text) goes to the head of the manifest, the rest under
+    ``[facts]``.
+
+    Raises
+    ------
+    OutputError
+        The folder exists (without `overwrite`) or cannot be written.
+    """
+    with whole_folder(path, overwrite=overwrite) as folder:
+        if scene.points is not None:
+            from .las_files import write_points
+
+            write_points(scene.points, folder / FILES["points"], crs=scene.crs)
+        if scene.image is not None:
+            from .raster_files import write_image
+
+            write_image(scene.image, folder / FILES["image"], crs=scene.crs)
+        if scene.dem is not None:
+            from .raster_files import write_elevation
+
+            write_elevation(scene.dem, folder / FILES["dem"], crs=scene.crs)
+        if scene.reference is not None:
+            _write_reference(scene.reference, folder / FILES["reference"], scene.crs)
+        if scene.area is not None:
+            _write_area(scene.area, folder / FILES["area"], scene.crs)
+        _write_manifest(folder, _manifest(scene, folder))
+
+
+def read_manifest(path: str | os.PathLike[str]) -> tuple[Path, dict[str, Any]]:
+    """Return the folder and the checked content of its ``scene.toml``."""
+    given = Path(path)
+    folder = given.parent if given.name == MANIFEST else given
+    file = folder / MANIFEST
+    if not folder.exists():
+        raise InputError(f"{folder}: no such folder; make a scene with roofbench scenes import or scenes make")
+    if not file.is_file():
+        raise InputError(
+            f"{folder} is not a scene: there is no {MANIFEST} in it; make one with roofbench scenes import"
+        )
+    try:
+        manifest = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{file} is not valid TOML: {error}") from error
+    problem = _manifest_problem(manifest)
+    if problem:
+        raise InputError(f"{file}: {problem}")
+    for kind in manifest.get("files", {}):
+        if not (folder / FILES[kind]).is_file():
+            raise InputError(
+                f"{folder / FILES[kind]}: no such file, though {MANIFEST} lists it; put it back or make the scene again"
+            )
+    return folder, manifest
+
+
+def changed_files(path: str | os.PathLike[str]) -> list[str]:
+    """Return the names of the files whose SHA-256 is not the one in the manifest."""
+    folder, manifest = read_manifest(path)
+    files: dict[str, Mapping[str, Any]] = manifest.get("files", {})
+    return [FILES[kind] for kind, entry in files.items() if _sha256(folder / FILES[kind]) != entry["sha256"]]
+
+
+def seal_scene(path: str | os.PathLike[str]) -> list[str]:
+    """Take the files as they are now into the manifest, after an edit that is meant; return those that differed."""
+    changed = changed_files(path)
+    folder, manifest = read_manifest(path)
+    for entry_kind, entry in manifest.get("files", {}).items():
+        entry["sha256"] = _sha256(folder / FILES[entry_kind])
+    _write_manifest(folder, manifest)
+    return changed
+
+
+def _manifest(scene: Scene, folder: Path) -> dict[str, Any]:
+    facts = dict(scene.facts)
+    manifest: dict[str, Any] = {"format": _FORMAT, "name": scene.name}
+    if scene.crs is not None:
+        manifest["crs"] = scene.crs
+    manifest["units"] = "metre"
+    manifest["extent"] = list(scene.extent)
+    for key in ("source", "licence", "notes", "derived"):
+        if facts.get(key):
+            manifest[key] = facts.pop(key)
+        else:
+            facts.pop(key, None)
+    files = {}
+    for kind, name in FILES.items():
+        if (folder / name).exists():
+            files[kind] = {"file": name, "sha256": _sha256(folder / name), **_file_facts(kind, scene)}
+    if files:
+        manifest["files"] = files
+    if facts:
+        manifest["facts"] = facts
+    plain: dict[str, Any] = _plain(manifest)
+    return plain
+
+
+def _file_facts(kind: str, scene: Scene) -> dict[str, Any]:
+    if kind == "points" and scene.points is not None:
+        return {"count": len(scene.points)}
+    if kind == "image" and scene.image is not None:
+        return {"bands": list(scene.image.bands), "gsd": scene.image.grid.gsd}
+    if kind == "dem" and scene.dem is not None:
+        return {"gsd": scene.dem.grid.gsd}
+    if kind == "reference" and scene.reference is not None:
+        return {"count": len(scene.reference)}
+    return {}
+
+
+def _manifest_problem(manifest: Mapping[str, Any]) -> str | None:
+    """Return what is wrong with a manifest, in words, or None."""
+    if manifest.get("format") != _FORMAT:
+        return f"format {manifest.get('format')!r} is not {_FORMAT}, the one this version of roofbench reads"
+    if not isinstance(manifest.get("name"), str) or not manifest["name"]:
+        return "it needs a name"
+    extent = manifest.get("extent")
+    numbers = isinstance(extent, list) and len(extent) == 4 and all(type(value) in (int, float) for value in extent)
+    if not numbers or not all(map(math.isfinite, extent)) or not (extent[2] > extent[0] and extent[3] > extent[1]):  # type: ignore[arg-type,index]
+        return f"extent {extent} must be [xmin, ymin, xmax, ymax] in metres"
+    if not isinstance(manifest.get("crs", ""), str):
+        return f"crs {manifest['crs']!r} must be a text such as EPSG:25832"
+    if manifest.get("units", "metre") != "metre":
+        return f"units {manifest['units']!r} must be metre"
+    files = manifest.get("files", {})
+    if not isinstance(files, dict):
+        return "[files] must be a table"
+    for kind, entry in files.items():
+        if kind not in FILES:
+            return f"[files.{kind}] is none of {', '.join(FILES)}"
+        if not isinstance(entry, dict) or not isinstance(entry.get("sha256"), str):
+            return f"[files.{kind}] needs its sha256"
+        if entry.get("file", FILES[kind]) != FILES[kind]:
+            return f"[files.{kind}] names {entry['file']!r}, but this file is always {FILES[kind]}"
+    return None
+
+
+def _reader(kind: str, file: Path, manifest: Mapping[str, Any]) -> Any:
+    """Return the function that reads one file of a scene."""
+
+    def points() -> PointCloud:
+        from .las_files import read_points
+
+        return read_points(file)
+
+    def image() -> Image:
+        from .raster_files import read_image
+
+        return read_image(file, bands=manifest["files"]["image"].get("bands"))
+
+    def dem() -> Elevation:
+        from .raster_files import read_elevation
+
+        return read_elevation(file)
+
+    def reference() -> Footprints:
+        from .vector_files import read_footprints
+
+        return read_footprints(file)
+
+    def area() -> shapely.Geometry:
+        from .vector_files import read_footprints
+
+        return shapely.union_all(read_footprints(file).polygons)
+
+    return {"points": points, "image": image, "dem": dem, "reference": reference, "area": area}[kind]
+
+
+def _write_reference(reference: Footprints, file: Path, crs: str | None) -> None:
+    from .vector_files import write_layers
+
+    columns: dict[str, Any] = dict(reference.attributes)
+    # Always there, so that a person who opens the file sees that parts can share one.
+    columns["building_id"] = (
+        np.arange(len(reference), dtype=np.int64) if reference.building_ids is None else reference.building_ids
+    )
+    write_layers({"reference": (reference.polygons, columns)}, file, crs=crs)
+
+
+def _write_area(area: shapely.Geometry, file: Path, crs: str | None) -> None:
+    from .vector_files import write_layers
+
+    write_layers({"area": (np.array([area], dtype=object), {"id": np.array([0])})}, file, crs=crs)
+
+
+def _write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+    import tomli_w
+
+    from .output import whole_file
+
+    with whole_file(folder / MANIFEST, overwrite=True) as scratch:
+        scratch.write_text(tomli_w.dumps(manifest), encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """Return what TOML can hold: numpy scalars as numbers, tuples as lists; None is left out."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(item) for item in value if item is not None]
+    if isinstance(value, np.generic):
+        return value.item()
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    return str(value)
+
+
+def _sha256(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _content_hash(folder: Path, manifest: Mapping[str, Any]) -> str:
+    """Return the digest of the manifest's digests, after checking that the files are still those."""
+    changed = changed_files(folder)
+    if changed:
+        raise InputError(
+            f"{folder}: {', '.join(changed)} changed since {MANIFEST} was written: if that is meant, take it in with "
+            "roofbench scenes check --seal"
+        )
+    digest = hashlib.sha256(repr((manifest["extent"], manifest.get("crs"))).encode())
+    for kind in FILES:
+        if kind in manifest.get("files", {}):
+            digest.update(f"{kind} {manifest['files'][kind]['sha256']}\n".encode())
+    return digest.hexdigest()

@@ -1,0 +1,393 @@
+"""GeoTIFF files: orthoimages and elevation models read by window or warped to a grid, and written.
+
+Nouns
+-----
+north up
+    The affine transform has no rotation and rows run southwards; that is what `Grid` can hold.
+mosaic
+    Several files brought to one grid; where they overlap the first that has data wins.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .crs import crs_label, crs_text, require_metric, same_crs
+from .errors import CRSError, InputError
+from .raster import Elevation, Grid, Image
+
+__all__ = [
+    "BANDS",
+    "RasterHeader",
+    "mosaic_elevation",
+    "mosaic_image",
+    "read_elevation",
+    "read_image",
+    "read_raster_header",
+    "write_elevation",
+    "write_image",
+]
+
+#: Names that a band can have; any other in ``--bands`` is refused, ``-`` skips one.
+BANDS = ("red", "green", "blue", "nir", "grey")
+_DEFAULT_BANDS = {1: ("grey",), 3: ("red", "green", "blue"), 4: ("red", "green", "blue", "nir")}
+
+
+@dataclass(frozen=True)
+class RasterHeader:
+    """What a raster file says of itself.
+
+    Attributes
+    ----------
+    path : Path
+    crs : str, optional
+        Horizontal CRS; None when the file has none.
+    grid : Grid
+        Its own grid; for cells that are not square, the one of the smaller side.
+    band_count : int
+        Without an alpha band.
+    band_names : tuple of str
+        Descriptions of the bands; empty texts where there are none.
+    dtype : str
+        ``"uint8"``.
+    square : bool
+        Whether the cells are square.
+    """
+
+    path: Path
+    crs: str | None
+    grid: Grid
+    band_count: int
+    band_names: tuple[str, ...]
+    dtype: str
+    square: bool
+
+
+def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) -> RasterHeader:
+    """Read what a raster file says of itself and check its georeference.
+
+    Parameters
+    ----------
+    path : path
+    crs : str, optional
+        CRS that replaces the file's own (which is then not checked).
+
+    Raises
+    ------
+    InputError
+        Missing, not a raster, no georeference, rotated or upside down.
+    CRSError
+        Units other than metres. A geographic CRS passes when it can be warped, which is for the caller to say.
+    """
+    file = Path(path)
+    with _opened(file) as source:
+        if source.transform.is_identity and not source.crs:
+            raise InputError(
+                f"{file} has no georeference: expected a GeoTIFF with an affine transform and a CRS; "
+                "set them with gdal_edit.py -a_srs -a_ullr, or put its world file (.tfw) beside it"
+            )
+        if source.transform.is_identity:
+            raise InputError(
+                f"{file} has a CRS but no affine transform: set its corners with gdal_edit.py -a_ullr or put its "
+                "world file (.tfw) beside it"
+            )
+        a, b, c, d, e, f = tuple(source.transform)[:6]
+        if abs(b) > 1e-9 * abs(a) or abs(d) > 1e-9 * abs(e) or a <= 0 or e >= 0:
+            raise InputError(
+                f"{file} is rotated or not north up (affine transform {a:g}, {b:g}, {d:g}, {e:g}): make it north up, "
+                "for instance with gdalwarp"
+            )
+        own = crs
+        if own is None and source.crs:
+            own = _source_crs(file, source)
+        side = min(a, -e)
+        grid = Grid(c, f, side, max(1, round(source.height * -e / side)), max(1, round(source.width * a / side)))
+        colours = source.colorinterp
+        count = sum(colour.name != "alpha" for colour in colours)
+        return RasterHeader(
+            path=file,
+            crs=own,
+            grid=grid,
+            band_count=count,
+            band_names=tuple((text or "").lower() for text in source.descriptions[:count]),
+            dtype=source.dtypes[0],
+            square=abs(a + e) <= 1e-6 * a,
+        )
+
+
+def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = None) -> Image:
+    """Read an orthoimage whole, on its own grid.
+
+    Parameters
+    ----------
+    path : path
+    bands : sequence of str, optional
+        Names in the order of the file; ``"-"`` skips one. Without it the descriptions in the file, else by number:
+        1 grey, 3 red, green, blue, 4 red, green, blue, nir.
+    """
+    header = read_raster_header(path)
+    names = band_names(header, bands)
+    with _opened(header.path) as source:
+        indexes, kept = _band_indexes(names)
+        values = source.read(indexes)
+        valid = _valid(source)
+    return Image(_as_image_type(header, values), kept, header.grid, valid)
+
+
+def read_elevation(path: str | os.PathLike[str]) -> Elevation:
+    """Read an elevation model whole, on its own grid; cells without data are NaN."""
+    header = read_raster_header(path)
+    with _opened(header.path) as source:
+        values = source.read(1, masked=True).astype(np.float32).filled(np.nan)
+    return Elevation(values, header.grid)
+
+
+def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, ...]:
+    """Return one name per band of a file, ``"-"`` for those to skip."""
+    if bands is not None:
+        unknown = [name for name in bands if name not in (*BANDS, "-")]
+        if unknown:
+            raise InputError(f"--bands: {unknown[0]!r} is no band name; use {', '.join(BANDS)}, and - to skip one")
+        if len(bands) != header.band_count:
+            raise InputError(
+                f"{header.path} has {header.band_count} bands, but --bands names {len(bands)} "
+                f"({','.join(bands)}): name one for each, - to skip one"
+            )
+        named = [name for name in bands if name != "-"]
+        if len(set(named)) != len(named) or not named:
+            raise InputError(f"--bands: {','.join(bands)} must name at least one band and none twice")
+        return tuple(bands)
+    if all(name in BANDS for name in header.band_names) and len(set(header.band_names)) == header.band_count:
+        return header.band_names
+    if header.band_count not in _DEFAULT_BANDS:
+        raise InputError(
+            f"{header.path} has {header.band_count} bands, expected 1 (grey), 3 (red, green, blue) or 4 (and nir): "
+            "name them with --bands, - to skip one"
+        )
+    return _DEFAULT_BANDS[header.band_count]
+
+
+def mosaic_image(
+    paths: Sequence[str | os.PathLike[str]], grid: Grid, *, crs: str | None, bands: Sequence[str] | None = None
+) -> Image:
+    """Bring one or several orthoimages to `grid` in `crs`, which must be given when a file is in another one.
+
+    Files whose cells coincide with those of `grid` are copied, others resampled: averaged when their cells are much
+    smaller, else bilinear.
+    """
+    headers = [read_raster_header(path) for path in paths]
+    named = [band_names(header, bands) for header in headers]
+    kept = tuple(name for name in named[0] if name != "-")
+    for header, names in zip(headers, named, strict=True):
+        if set(names) - {"-"} != set(kept):
+            raise InputError(
+                f"{header.path} has the bands {', '.join(names)} but {headers[0].path} {', '.join(kept)}: "
+                "images of one scene must have the same"
+            )
+        _as_image_type(header, np.empty(0, dtype=header.dtype))
+        if header.dtype != headers[0].dtype:
+            raise InputError(
+                f"{header.path} is {header.dtype} but {headers[0].path} {headers[0].dtype}: convert one of them, "
+                "for instance with gdal_translate -ot"
+            )
+    values = np.zeros((len(kept), *grid.shape), dtype=headers[0].dtype)
+    valid = np.zeros(grid.shape, dtype=bool)
+    for header, names in zip(headers, named, strict=True):
+        indexes = [names.index(name) + 1 for name in kept]
+        for rows, columns, block, has_data in _warped(header, indexes, grid, crs):
+            fresh = has_data & ~valid[rows, columns]
+            values[:, rows, columns][:, fresh] = block[:, fresh]
+            valid[rows, columns] |= fresh
+    return Image(values, kept, grid, None if valid.all() else valid)
+
+
+def mosaic_elevation(paths: Sequence[str | os.PathLike[str]], grid: Grid, *, crs: str | None) -> Elevation:
+    """Bring one or several elevation models to `grid` in `crs`; cells without data are NaN."""
+    values = np.full(grid.shape, np.nan, dtype=np.float32)
+    for path in paths:
+        header = read_raster_header(path)
+        if header.band_count != 1:
+            raise InputError(f"{header.path} has {header.band_count} bands, expected an elevation model of one band")
+        for rows, columns, block, has_data in _warped(header, [1], grid, crs):
+            fresh = has_data & np.isfinite(block[0]) & np.isnan(values[rows, columns])
+            values[rows, columns][fresh] = block[0][fresh]
+    return Elevation(values, grid)
+
+
+def write_image(image: Image, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
+    """Write an orthoimage as a tiled, compressed GeoTIFF with named bands and, where there is one, a mask."""
+    import rasterio
+
+    profile = _profile(image.grid, crs, len(image.bands), image.values.dtype.name)
+    photometric = {"photometric": "RGB"} if image.bands[:3] == ("red", "green", "blue") else {}
+    with (
+        rasterio.Env(GDAL_TIFF_INTERNAL_MASK=True),
+        rasterio.open(path, "w", predictor=2, **profile, **photometric) as target,
+    ):
+        target.write(image.values)
+        for index, name in enumerate(image.bands, start=1):
+            target.set_band_description(index, name)
+        if len(image.bands) == 4 and photometric:
+            target.colorinterp = [*target.colorinterp[:3], rasterio.enums.ColorInterp.undefined]
+        if image.valid is not None:
+            target.write_mask(image.valid)
+
+
+def write_elevation(elevation: Elevation, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
+    """Write an elevation model as a tiled, compressed float32 GeoTIFF; no data is NaN."""
+    import rasterio
+
+    profile = _profile(elevation.grid, crs, 1, "float32")
+    with rasterio.open(path, "w", predictor=3, nodata=float("nan"), **profile) as target:
+        target.write(elevation.values.astype(np.float32), 1)
+
+
+def _profile(grid: Grid, crs: str | None, count: int, dtype: str) -> dict[str, Any]:
+    from rasterio import Affine
+
+    return {
+        "driver": "GTiff",
+        "width": grid.columns,
+        "height": grid.rows,
+        "count": count,
+        "dtype": dtype,
+        "crs": crs,
+        "transform": Affine(*grid.transform),
+        "tiled": True,
+        "blockxsize": 256,
+        "blockysize": 256,
+        "compress": "deflate",
+        "bigtiff": "if_safer",
+    }
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[Any]:
+    """Open a raster; what rasterio raises inside the block becomes one sentence."""
+    import warnings
+
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+
+    if not file.exists():
+        raise InputError(f"{file}: no such file")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)  # told as an error by read_raster_header
+            source = rasterio.open(file)
+        with source:
+            yield source
+    except RasterioError as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{file} cannot be read as an image ({reason}): give a GeoTIFF") from error
+
+
+def _source_crs(file: Path, source: Any) -> str | None:
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError as ProjError
+
+    try:
+        crs = CRS.from_wkt(source.crs.to_wkt())
+    except ProjError as error:
+        raise CRSError(f"{file}: its CRS cannot be read ({error}): set it with gdal_edit.py -a_srs") from error
+    return crs_text(crs)
+
+
+def _band_indexes(names: Sequence[str]) -> tuple[list[int], tuple[str, ...]]:
+    indexes = [index for index, name in enumerate(names, start=1) if name != "-"]
+    return indexes, tuple(name for name in names if name != "-")
+
+
+def _as_image_type(header: RasterHeader, values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype not in (np.uint8, np.uint16):
+        raise InputError(
+            f"{header.path} has {header.dtype} values, an orthoimage needs uint8 or uint16: convert it, for instance "
+            "with gdal_translate -ot Byte -scale"
+        )
+    return values
+
+
+def _valid(source: Any) -> NDArray[np.bool_] | None:
+    """Return where the image has data; None when everywhere."""
+    mask = source.dataset_mask() > 0
+    return None if mask.all() else mask
+
+
+def _warped(
+    header: RasterHeader, indexes: list[int], grid: Grid, crs: str | None
+) -> Iterator[tuple[slice, slice, NDArray[Any], NDArray[np.bool_]]]:
+    """Yield (rows, columns, values, has data) of the part of `grid` that a file covers, by bands of rows."""
+    from rasterio import Affine
+    from rasterio.enums import Resampling
+    from rasterio.vrt import WarpedVRT
+    from rasterio.warp import transform_bounds
+
+    if crs is None:
+        require_metric(header.crs, str(header.path))
+    warp = crs is not None and header.crs is not None and not same_crs(header.crs, crs)
+    bounds = header.grid.extent
+    if warp:
+        bounds = transform_bounds(header.crs, crs, *bounds, densify_pts=21)
+    columns = _span(bounds[0], bounds[2], grid.west, grid.gsd, grid.columns)
+    rows = _span(-bounds[3], -bounds[1], -grid.north, grid.gsd, grid.rows)
+    if columns is None or rows is None:
+        return
+    with _opened(header.path) as source:
+        ratio = grid.gsd / header.grid.gsd
+        resampling = Resampling.average if ratio > 1.5 else Resampling.bilinear
+        if not warp and header.square and _same_cells(grid, header.grid):
+            resampling = Resampling.nearest
+        common = crs or header.crs
+        for start in range(rows.start, rows.stop, 1024):
+            stop = min(start + 1024, rows.stop)
+            corner = grid.to_world(start, columns.start)
+            with WarpedVRT(
+                source,
+                src_crs=header.crs or common or "EPSG:3857",
+                crs=common or "EPSG:3857",  # a stand-in on both sides: no CRS is known and none is applied
+                transform=Affine(grid.gsd, 0, float(corner[0]), 0, -grid.gsd, float(corner[1])),
+                width=columns.stop - columns.start,
+                height=stop - start,
+                resampling=resampling,
+                add_alpha=source.nodata is None and not _has_alpha(source),
+            ) as view:
+                block = view.read(indexes)
+                has_data = view.dataset_mask() > 0
+            yield slice(start, stop), columns, block, has_data
+
+
+def _has_alpha(source: Any) -> bool:
+    return any(colour.name == "alpha" for colour in source.colorinterp)
+
+
+def _span(low: float, high: float, origin: float, gsd: float, count: int) -> slice | None:
+    """Return the cells of one axis of a grid that a file's range meets, or None."""
+    first = max(0, int(np.floor((low - origin) / gsd + 1e-6)))
+    last = min(count, int(np.ceil((high - origin) / gsd - 1e-6)))
+    return slice(first, last) if last > first else None
+
+
+def _same_cells(one: Grid, two: Grid) -> bool:
+    """Return whether the cells of two grids coincide."""
+    shift = np.array([(one.west - two.west) / one.gsd, (one.north - two.north) / one.gsd])
+    return abs(one.gsd - two.gsd) <= 1e-6 * one.gsd and bool((abs(shift - np.round(shift)) < 1e-3).all())
+
+
+def crs_message(header: RasterHeader, crs: str, grid: Grid) -> str | None:
+    """Return the sentence that tells how a file is brought to a scene's grid, or None when it is copied as it is."""
+    reasons = []
+    if header.crs is not None and not same_crs(header.crs, crs):
+        reasons.append(f"from {crs_label(header.crs)} to {crs_label(crs)}")
+    if not header.square or abs(header.grid.gsd - grid.gsd) > 1e-6 * grid.gsd:
+        reasons.append(f"from {header.grid.gsd:g} m to {grid.gsd:g} m cells")
+    elif not reasons and not _same_cells(grid, header.grid):
+        reasons.append("by a fraction of a cell")
+    return f"{header.path} was resampled {' and '.join(reasons)}" if reasons else None
