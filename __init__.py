@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .detectors.base import Detector, Step
     from .detectors.registry import make_detector
     from .evaluators.base import Evaluation, Evaluator, Index
+    from .evaluators.comparison import evaluate, pool
     from .evaluators.registry import make_evaluator
     from .scenes.errors import RoofbenchError
     from .scenes.folder import open_scene, save_scene
@@ -41,10 +42,12 @@ _HOMES = {
     "RoofbenchError": "scenes.errors",
     "Scene": "scenes.scene",
     "Step": "detectors.base",
+    "evaluate": "evaluators.comparison",
     "make_detector": "detectors.registry",
     "make_evaluator": "evaluators.registry",
     "open_scene": "scenes.folder",
     "parameter": "scenes.parameters",
+    "pool": "evaluators.comparison",
     "read_footprints": "scenes.vector_files",
     "save_scene": "scenes.folder",
     "write_footprints": "scenes.vector_files",
@@ -63,10 +66,12 @@ __all__ = [
     "RoofbenchError",
     "Scene",
     "Step",
+    "evaluate",
     "make_detector",
     "make_evaluator",
     "open_scene",
     "parameter",
+    "pool",
     "read_footprints",
     "save_scene",
     "write_footprints",

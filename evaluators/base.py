@@ -18,7 +18,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +32,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from shapely import Geometry
 
-__all__ = ["Evaluation", "Evaluator", "Index", "Verdicts", "mean_values"]
+__all__ = ["Better", "Evaluation", "Evaluator", "Index", "Samples", "Tallies", "Verdicts", "mean_values"]
 
-Tallies = Mapping[str, float]
-Samples = Mapping[str, NDArray[np.float64]]
+#: Which way an index improves.
+Better: TypeAlias = Literal["higher", "lower", "neither"]
+#: What adds up over scenes, and what is kept one by one.
+Tallies: TypeAlias = Mapping[str, float]
+Samples: TypeAlias = Mapping[str, NDArray[np.float64]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +65,7 @@ class Index:
     key: str
     title: str
     symbol: str
-    better: Literal["higher", "lower", "neither"]
+    better: Better
     unit: str
     range: tuple[float, float]
     meaning: str

@@ -209,9 +209,11 @@ class Footprints:
     @cached_property
     def centres(self) -> NDArray[np.float64]:
         """Centre of each footprint, shape (n, 2), metres (2010 paper, section 4.1)."""
-        centroids = shapely.centroid(self.polygons)
-        centres = np.stack([shapely.get_x(centroids), shapely.get_y(centroids)], axis=-1).reshape(-1, 2)
+        centres = np.empty((len(self), 2))
         index, corners = self.quadrilaterals
+        others = np.ones(len(self), dtype=bool)
+        others[index] = False
+        centres[others] = shapely.get_coordinates(shapely.centroid(self.polygons[others]))
         if len(index):
             first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
             offset = corners[:, 1] - corners[:, 0]

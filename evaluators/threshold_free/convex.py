@@ -1,0 +1,80 @@
+"""Intersection areas of convex quadrilaterals, many pairs at once.
+
+Footprints are mostly rectangles, and general polygon overlay is fifty times dearer than clipping one rectangle by the
+four half planes of another. All pairs are clipped together, one half plane at a time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["convex_intersection_areas"]
+
+#: Pairs clipped at once: large enough to hide the interpreter, small enough for the processor's cache.
+_CHUNK = 1 << 14
+
+
+def convex_intersection_areas(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the intersection area of each pair of convex quadrilaterals.
+
+    Parameters
+    ----------
+    first, second : ndarray, shape (n, 4, 2)
+        Corners in counter-clockwise order, metres.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Square metres; 0 for pairs that touch or are apart.
+
+    Examples
+    --------
+    >>> square = np.array([[[0.0, 0], [2, 0], [2, 2], [0, 2]]])
+    >>> convex_intersection_areas(square, square + 1.0)
+    array([1.])
+    """
+    areas = np.empty(len(first))
+    for start in range(0, len(first), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        # Coordinates from a corner of the pair keep all digits however far the scene is from the origin of its CRS.
+        origin = second[part, :1]
+        areas[part] = _clip(first[part] - origin, second[part] - origin)
+    return areas
+
+
+def _clip(subject: NDArray[np.float64], window: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sutherland-Hodgman: clip by each edge's left half plane; vertices beyond `count` repeat the first one."""
+    n = len(subject)
+    x, y = subject[..., 0], subject[..., 1]
+    for edge in range(4):
+        ax, ay = window[:, edge, 0, None], window[:, edge, 1, None]
+        dx = window[:, (edge + 1) % 4, 0, None] - ax
+        dy = window[:, (edge + 1) % 4, 1, None] - ay
+        side = dx * (y - ay) - dy * (x - ax)
+        inside = side >= 0
+        next_x, next_y = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
+        next_side, next_inside = np.roll(side, -1, axis=1), np.roll(inside, -1, axis=1)
+        crossing = inside != next_inside
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along = np.where(crossing, side / (side - next_side), 0.0)
+        vertices = x.shape[1]
+        # Each old vertex yields up to two new ones: itself when inside, and the crossing of the edge that follows.
+        out_x, out_y = np.empty((n, 2 * vertices)), np.empty((n, 2 * vertices))
+        keep = np.empty((n, 2 * vertices), dtype=bool)
+        out_x[:, 0::2], out_y[:, 0::2], keep[:, 0::2] = x, y, inside
+        out_x[:, 1::2], out_y[:, 1::2] = x + along * (next_x - x), y + along * (next_y - y)
+        keep[:, 1::2] = crossing
+        place = np.cumsum(keep, axis=1) - 1
+        # A half plane adds at most one vertex to a convex ring.
+        new_x, new_y = np.zeros((n, vertices + 1)), np.zeros((n, vertices + 1))
+        row, slot = np.nonzero(keep & (place <= vertices))
+        target = place[row, slot]
+        new_x[row, target], new_y[row, target] = out_x[row, slot], out_y[row, slot]
+        count = np.minimum(place[:, -1] + 1, vertices + 1)
+        empty = np.arange(vertices + 1) >= count[:, None]
+        x = np.where(empty, new_x[:, :1], new_x)
+        y = np.where(empty, new_y[:, :1], new_y)
+    doubled = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+    areas: NDArray[np.float64] = np.maximum(doubled, 0.0) / 2
+    return areas

@@ -1,0 +1,102 @@
+"""Overlaps: which footprints share area, and how much.
+
+Two footprints *overlap* when they share more than `NUMERICAL_ZERO` of the smaller one's area; footprints that merely
+touch do not. This is no matching threshold: it separates shared area from rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...scenes.footprints import Footprints
+from .convex import convex_intersection_areas
+
+__all__ = ["NUMERICAL_ZERO", "Overlaps", "overlaps_between", "overlaps_within"]
+
+#: Share of the smaller area up to which an intersection is rounding (evaluation.md, section 1).
+NUMERICAL_ZERO = 1e-6
+
+_CHUNK = 1 << 18
+
+
+@dataclass(frozen=True, eq=False)
+class Overlaps:
+    """Pairs that share area, sorted by (first, second).
+
+    Attributes
+    ----------
+    first, second : ndarray of int64, shape (n,)
+        Rows in the two sets (in one set: first < second).
+    area : ndarray, shape (n,)
+        Shared area, m2, more than 0.
+    significant : ndarray of bool, shape (n,)
+        Whether the pair overlaps; the others share no more than rounding.
+    """
+
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    area: NDArray[np.float64]
+    significant: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    @cached_property
+    def only_significant(self) -> Overlaps:
+        """The pairs that overlap in the sense of the evaluation."""
+        return self.where(self.significant)
+
+    def where(self, mask: NDArray[np.bool_]) -> Overlaps:
+        """Return the pairs at `mask`."""
+        return Overlaps(self.first[mask], self.second[mask], self.area[mask], self.significant[mask])
+
+
+def overlaps_between(detected: Footprints, reference: Footprints) -> Overlaps:
+    """Return the pairs (detection, reference) that share area; cost grows with the number of such pairs."""
+    if not len(detected) or not len(reference):
+        return _measured(detected, reference, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+    tree = shapely.STRtree(reference.polygons)
+    first, second = tree.query(detected.polygons)
+    return _measured(detected, reference, first, second)
+
+
+def overlaps_within(footprints: Footprints) -> Overlaps:
+    """Return the pairs of one set that share area, each once, with first < second."""
+    if len(footprints) < 2:
+        return _measured(footprints, footprints, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+    first, second = shapely.STRtree(footprints.polygons).query(footprints.polygons)
+    once = first < second
+    return _measured(footprints, footprints, first[once], second[once])
+
+
+def _measured(one: Footprints, two: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]) -> Overlaps:
+    order = np.lexsort((second, first))
+    first, second = first[order].astype(np.int64), second[order].astype(np.int64)
+    area = np.zeros(len(first))
+    rectangle_one, rectangle_two = _corner_rows(one), _corner_rows(two)
+    row_one, row_two = rectangle_one[first], rectangle_two[second]
+    convex = (row_one >= 0) & (row_two >= 0)
+    corners_one, corners_two = one.quadrilaterals[1], two.quadrilaterals[1]
+    for start in range(0, len(first), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        quick = np.flatnonzero(convex[part]) + start
+        area[quick] = convex_intersection_areas(corners_one[row_one[quick]], corners_two[row_two[quick]])
+        slow = np.flatnonzero(~convex[part]) + start
+        shared = shapely.intersection(one.polygons[first[slow]], two.polygons[second[slow]])
+        area[slow] = shapely.area(shared)
+    smaller = np.minimum(one.areas[first], two.areas[second])
+    found = Overlaps(first, second, area, area > NUMERICAL_ZERO * smaller)
+    return found.where(area > 0)
+
+
+def _corner_rows(footprints: Footprints) -> NDArray[np.int64]:
+    """Return for each footprint its row among the convex quadrilaterals, or -1."""
+    rows = np.full(len(footprints), -1, dtype=np.int64)
+    index = footprints.quadrilaterals[0]
+    rows[index] = np.arange(len(index))
+    return rows

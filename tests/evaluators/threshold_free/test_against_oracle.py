@@ -1,0 +1,99 @@
+"""The fast evaluator agrees with plain loops (naive.py) on a thousand random scenes."""
+
+import naive
+import numpy as np
+import pytest
+import shapely
+from random_sets import random_detections, random_reference
+
+import roofbench as rb
+from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
+from roofbench.scenes.raster import Grid
+
+
+def scene(seed, *, general):
+    rng = np.random.default_rng(seed)
+    reference, building = random_reference(rng, general=general)
+    return random_detections(rng, reference), reference, building
+
+
+def footprints(polygons, building=None):
+    return rb.Footprints.of(polygons, building_ids=building)
+
+
+def assert_same(evaluation, expected):
+    scale = max(
+        1.0, expected["areas.true_positive"] + expected["areas.false_positive"] + expected["areas.false_negative"]
+    )
+    for key, value in expected.items():
+        if key.startswith("counts."):
+            assert evaluation.tallies[key] == value, key
+        else:
+            assert evaluation.tallies[key] == pytest.approx(value, rel=1e-9, abs=1e-9 * scale), key
+
+
+@pytest.mark.parametrize("matching", ["nearest", "one-pass", "overlap"])
+@pytest.mark.parametrize("general", [False, True], ids=["rectangles", "polygons"])
+@pytest.mark.parametrize("block", range(10))
+def test_counts_are_equal_and_areas_agree_to_nine_digits(block, general, matching):
+    evaluator = ThresholdFree(matching=matching)
+    seeds = range(50 * block, 50 * (block + 1)) if matching == "nearest" else range(10 * block, 10 * (block + 1))
+    for seed in seeds:
+        detected, reference, building = scene(seed, general=general)
+        evaluation = evaluator.evaluate(footprints(detected), footprints(reference, building))
+        assert_same(evaluation, naive.evaluate(detected, reference, building, matching=matching))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_evaluation_area_and_minimum_size_are_as_defined(seed):
+    detected, reference, building = scene(seed, general=seed % 2 == 0)
+    area = naive.rectangle(30, 30, 45, 35, seed)
+    evaluator = ThresholdFree(minimum_area=45.0 if seed % 3 else 0.0)
+    evaluation = evaluator.evaluate(footprints(detected), footprints(reference, building), area=area)
+    expected = naive.evaluate(detected, reference, building, area=area, minimum_area=evaluator.minimum_area)
+    assert_same(evaluation, expected)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_pixel_areas_count_the_pixel_centres_inside(seed):
+    detected, reference, _ = scene(seed, general=seed % 2 == 0)
+    grid = Grid(west=-3.217, north=71.113, gsd=0.37, rows=10, columns=10)
+    evaluation = ThresholdFree().evaluate(footprints(detected), footprints(reference), grid=grid)
+    matches, nearest = naive.correspondence(detected, reference)
+    false_positive = [d for d in range(len(detected)) if d not in nearest]
+    false_negative = [r for r in range(len(reference)) if r not in matches.values()]
+    expected = naive.pixel_areas(
+        detected, reference, matches, false_positive, false_negative, grid.west, grid.north, grid.gsd
+    )
+    found = [evaluation.tallies[f"areas.{name}"] for name in ("true_positive", "false_positive", "false_negative")]
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_pixel_areas_in_many_bands_are_those_in_one(monkeypatch):
+    detected, reference, _ = scene(4, general=True)
+    whole = ThresholdFree(area="pixels", gsd=0.05).evaluate(footprints(detected), footprints(reference))
+    monkeypatch.setattr("roofbench.evaluators.threshold_free.pixels._BAND_CROSSINGS", 97)
+    banded = ThresholdFree(area="pixels", gsd=0.05).evaluate(footprints(detected), footprints(reference))
+    assert banded.tallies == whole.tallies
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pixel_areas_tend_to_exact_areas_as_the_gsd_shrinks(seed):
+    detected, reference, building = scene(seed, general=True)
+    exact = ThresholdFree(area="exact").evaluate(footprints(detected), footprints(reference, building))
+    perimeter = sum(polygon.length for polygon in [*detected, *reference])
+    for gsd in (1.0, 0.3, 0.1, 0.03, 0.01):
+        pixels = ThresholdFree(area="pixels", gsd=gsd).evaluate(footprints(detected), footprints(reference, building))
+        for name in ("true_positive", "false_positive", "false_negative"):
+            error = abs(pixels.tallies[f"areas.{name}"] - exact.tallies[f"areas.{name}"])
+            # A pixel can be wrong only where an outline crosses it.
+            assert error <= perimeter * gsd
+
+
+def test_touching_footprints_share_every_pixel_between_them_once():
+    left, right = shapely.box(0, 0, 1, 1), shapely.box(1, 0, 2, 1)
+    both = shapely.box(0, 0, 2, 1)
+    evaluate = ThresholdFree(area="pixels", gsd=0.25).evaluate
+    apart = evaluate(footprints([left, right]), footprints([]))
+    whole = evaluate(footprints([both]), footprints([]))
+    assert apart.tallies["areas.false_positive"] == whole.tallies["areas.false_positive"] == pytest.approx(2.0)
