@@ -34,8 +34,9 @@ __all__ = ["elevation_from_points", "fill_unknown", "ground_surface"]
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
 
-#: Points in height within this many metres of a cell's lowest point support it, itself included; how many must.
-_SUPPORT_HEIGHT, _SUPPORT = 1.0, 3
+#: Points in height within this many metres of a cell's lowest point support it, itself included; how many must, and
+#: which share of the points around.
+_SUPPORT_HEIGHT, _SUPPORT, _SUPPORT_SHARE = 1.0, 3, 0.05
 #: Windows up to this radius in metres remove what they remove, walls or not: shrubs and crowns have ragged borders.
 _NARROW = 6.0
 #: Share of the border of a wide object that must be wall.
@@ -138,8 +139,8 @@ def default_cell(x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequenc
 def lowest_surface(x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64], grid: Grid) -> _Floats:
     """Return the lowest point of each cell that is not isolated, shape (rows, columns); NaN without one.
 
-    A lowest point is isolated when fewer than three points in its 5 x 5 cells lie within 1 m of its height: a
-    reflection from below the ground or a no-data height. It is passed over and the next lowest is tried.
+    A lowest point is isolated when fewer than three points, or 5 % of the points, in its 5 x 5 cells lie within 1 m
+    of its height: a reflection from below the ground or a no-data height. It is passed over for the next lowest.
     """
     index, inside = grid.cells(x, y)
     order = np.argsort(index[inside], kind="stable")
@@ -172,14 +173,15 @@ def _lowest_supported(heights, start, rows, columns):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def _supported(heights, start, rows, columns, row, column, height):  # type: ignore[no-untyped-def]
-    count = 0
+    support, around = 0, 0
     for r in range(max(row - 2, 0), min(row + 3, rows)):
-        for i in range(start[r * columns + max(column - 2, 0)], start[r * columns + min(column + 3, columns)]):
+        first = start[r * columns + max(column - 2, 0)]
+        last = start[r * columns + min(column + 2, columns - 1) + 1]
+        around += last - first
+        for i in range(first, last):
             if abs(heights[i] - height) < _SUPPORT_HEIGHT:
-                count += 1
-                if count >= _SUPPORT:
-                    return True
-    return False
+                support += 1
+    return support >= max(_SUPPORT, _SUPPORT_SHARE * around)
 
 
 def fill_unknown(values: _Floats) -> _Floats:

@@ -11,7 +11,7 @@ def lowest_surface(x, y, z, grid):
             near = (abs(row - r) <= 2) & (abs(column - c) <= 2) & (row >= 0) & (row < grid.rows)
             near &= (column >= 0) & (column < grid.columns)
             for height in sorted(z[(row == r) & (column == c)]):
-                if np.sum(abs(z[near] - height) < 1.0) >= 3:
+                if np.sum(abs(z[near] - height) < 1.0) >= max(3, 0.05 * near.sum()):
                     lowest[r, c] = height
                     break
     return lowest

@@ -1,0 +1,260 @@
+"""The plain baseline: what is high, not a tree, and large enough, is a building.
+
+1. Points are gathered on a grid as fine as their spacing allows; heights are above the DEM, else above a ground
+   surface filtered from the points.
+2. A cell is *high* where at least half of its points are above the height threshold.
+3. Each cue that the scene offers (multiple returns, roughness, penetration, image vegetation) says between -1 (roof)
+   and +1 (tree) how a cell looks; a high cell whose mean is negative is *roof*.
+4. Closing, filling of small holes and opening with a disc clean the mask; small regions go.
+5. The outline is traced to a fraction of a cell and given straight walls along its main directions, or replaced by its
+   minimum-area rectangle.
+
+Nothing is learned and nothing is random: the same points give the same footprints.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ..scenes.footprints import Footprints
+from ..scenes.parameters import parameter
+from ..scenes.points import PointCloud
+from ..scenes.raster import Grid
+from ..scenes.scene import Scene
+from .base import Detector
+from .cues import CellCues, cell_cues, greenness
+from .heights import ground_of, heights_above_ground
+from .outlines import coverage_of_mask, minimum_rectangles, regularise, trace
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["NDSM"]
+
+_Floats = NDArray[np.float32]
+_Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NDSM(Detector):
+    """Height above ground with vegetation cues, opening and traced outlines: the plain baseline."""
+
+    name = "ndsm"
+    requires = ("points",)
+
+    height: float = parameter(
+        2.5,
+        unit="m",
+        minimum=0.5,
+        maximum=20,
+        doc="height above ground from which on a point is high",
+        source="Awrangjeb 2010, section 3.2",
+        swept=(1.5, 2.0, 2.5, 3.0),
+    )
+    cell: float | None = parameter(
+        None, unit="m", minimum=0.1, maximum=5, doc="cell size; none: 1.4 times the point spacing, 0.25 to 2 m"
+    )
+    dem: bool = parameter(True, doc="take the ground from the DEM where there is one; false: always from the points")
+    multiple_share: float | None = parameter(
+        0.5, minimum=0, maximum=1, doc="share of multiple returns from which on a cell looks like a tree; none: unused"
+    )
+    roughness: float | None = parameter(
+        0.3,
+        unit="m",
+        minimum=0.01,
+        maximum=5,
+        doc="deviation from a local plane from which on a cell looks like a tree; none: unused",
+    )
+    penetration: float | None = parameter(
+        0.35,
+        minimum=0,
+        maximum=1,
+        doc="share of points below the height from which on a high cell looks like a tree; none: unused",
+    )
+    ndvi: float | None = parameter(
+        0.15, minimum=-1, maximum=1, doc="(NIR - R) / (NIR + R) of vegetation, with a NIR band; none: unused"
+    )
+    green_red: float | None = parameter(
+        0.05, minimum=-1, maximum=1, doc="(G - R) / (G + R) of vegetation, without a NIR band; none: unused"
+    )
+    darkest: float = parameter(
+        0.1, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel say nothing: shadow"
+    )
+    closing: float = parameter(0.5, unit="m", minimum=0, maximum=10, doc="radius of the closing")
+    opening: float = parameter(
+        1.0, unit="m", minimum=0, maximum=10, doc="radius of the opening: narrower parts are cut off"
+    )
+    largest_hole: float = parameter(4.0, unit="m2", minimum=0, doc="holes up to this area are filled")
+    most_tree_like: float = parameter(
+        -0.5, minimum=-1, maximum=1, doc="footprints whose cells look more like a tree on average are dropped"
+    )
+    smallest_area: float = parameter(8.0, unit="m2", minimum=0, doc="smaller footprints are dropped")
+    outline: Literal["polygon", "rectangle"] = parameter(
+        "polygon",
+        choices=("polygon", "rectangle"),
+        doc="traced polygon with straight walls, or rectangle of least area around it",
+    )
+    tolerance: float | None = parameter(
+        None, unit="m", minimum=0, maximum=5, doc="how far traced points may lie beside a wall; none: one cell"
+    )
+
+    def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
+        """Return the buildings of a scene; attributes `height` (mean above ground, m) and `tree_likeness` (-1..1)."""
+        return self._work(scene).footprints
+
+    def _work(self, scene: Scene) -> _Work:
+        scene = scene.for_detection()
+        points = scene.points
+        assert points is not None
+        heights = heights_above_ground(points, ground_of(scene, use_dem=self.dem))
+        grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
+        cues = cell_cues(points, heights, grid, threshold=self.height)
+        likeness = self._tree_likeness(cues, self._vegetation(scene, grid))
+        high = np.nan_to_num(cues.high_share) >= 0.5
+        roof = high & ((likeness < 0) | np.isnan(likeness))
+        mask = self._clean(roof, grid.gsd)
+        share = np.where(likeness > 0, np.float32(0), cues.high_share)
+        coverage = coverage_of_mask(mask, share)
+        traced = trace(coverage, grid)
+        return _Work(
+            cues=cues,
+            likeness=likeness,
+            roof=roof,
+            mask=mask,
+            traced=traced,
+            footprints=self._footprints(traced, cues, likeness, scene.crs),
+        )
+
+    def _vegetation(self, scene: Scene, grid: Grid) -> tuple[_Floats, float] | None:
+        """Return the vegetation index of the image per cell and its threshold."""
+        image = scene.image
+        if image is None:
+            return None
+        threshold = self.ndvi if "nir" in image.bands else self.green_red
+        index = None if threshold is None else greenness(image, grid, darkest=self.darkest)
+        return None if index is None or threshold is None else (index, threshold)
+
+    def _tree_likeness(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> _Floats:
+        """Return the mean of what the cues say: -1 roof, +1 tree, NaN where none says anything."""
+        said = []
+        for value, threshold, width in (
+            (cues.multiple_share, self.multiple_share, 0.25),
+            (cues.roughness, self.roughness, 0.2),
+            (cues.penetration, self.penetration, 0.15),
+            (*(vegetation or (None, None)), 0.05),
+        ):
+            if value is not None and threshold is not None:
+                said.append(np.clip((value - np.float32(threshold)) / np.float32(width), -1, 1))
+        total = np.zeros(cues.grid.shape, dtype=np.float32)
+        count = np.zeros(cues.grid.shape, dtype=np.float32)
+        for cue in said:
+            told = np.isfinite(cue)
+            total += np.where(told, cue, 0)
+            count += told
+        return np.where(count > 0, total / np.maximum(count, 1), np.float32(np.nan))
+
+    def _clean(self, roof: _Mask, cell: float) -> _Mask:
+        """Close, fill small holes and open."""
+        import cv2
+
+        mask = cv2.morphologyEx(roof.astype(np.uint8), cv2.MORPH_CLOSE, _disc(self.closing / cell))
+        _, labels, statistics, _ = cv2.connectedComponentsWithStats(1 - mask, connectivity=4)
+        small = statistics[:, cv2.CC_STAT_AREA] * cell**2 <= self.largest_hole
+        small[0] = False
+        mask[small[labels]] = 1
+        opened = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(self.opening / cell))
+        return _with_corners(opened, mask, 0.5 * self.opening / cell)
+
+    def _footprints(
+        self, traced: NDArray[np.object_], cues: CellCues, likeness: _Floats, crs: str | None
+    ) -> Footprints:
+        inside = [_cells_inside(polygon, cues.grid) for polygon in traced]
+        looks = np.array([_mean(likeness, cells) for cells in inside])
+        # Where no cue says anything the mean is NaN, and the footprint stays.
+        keep = ~(looks > self.most_tree_like) & (shapely.area(traced) >= self.smallest_area)
+        if self.outline == "rectangle":
+            polygons = minimum_rectangles(traced[keep])
+        else:
+            tolerance = cues.grid.gsd if self.tolerance is None else self.tolerance
+            polygons = regularise(traced[keep], tolerance)
+        height = np.array([_mean(cues.height, cells) for cells in inside])
+        attributes = {"height": height[keep], "tree_likeness": looks[keep]}
+        return Footprints.of(polygons, crs=crs, attributes=attributes, source=self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """All intermediate results of one detection."""
+
+    cues: CellCues
+    likeness: _Floats
+    roof: _Mask
+    mask: _Mask
+    traced: NDArray[np.object_]
+    footprints: Footprints
+
+
+def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple[float, float, float, float]) -> float:
+    """Return 1.4 times the point spacing in metres, in steps of 0.05 m, 0.25 to 2 m.
+
+    The spacing is that of the covered part of the extent (2 m cells that hold points).
+    """
+    coarse = Grid.covering(extent, 2.0)
+    index, inside = coarse.cells(points.x, points.y)
+    used = inside & np.isfinite(heights)
+    covered = np.count_nonzero(np.bincount(index[used], minlength=1))
+    if covered == 0:
+        return 1.0
+    spacing = math.sqrt(covered * 4.0 / np.count_nonzero(used))
+    return min(max(round(1.4 * spacing / 0.05) * 0.05, 0.25), 2.0)
+
+
+def _disc(radius: float) -> NDArray[np.uint8]:
+    """Return a disc of a radius in cells; a single cell below half a cell."""
+    reach = int(radius + 0.5)
+    row, column = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    disc: NDArray[np.uint8] = (row**2 + column**2 <= max(radius, reach) ** 2 + 0.5).astype(np.uint8)
+    return disc
+
+
+def _with_corners(opened: NDArray[np.uint8], mask: NDArray[np.uint8], radius: float) -> _Mask:
+    """Return the opened mask with what the mask has within a radius of it, but no region joined to another.
+
+    A disc of radius r leaves a square corner bare over 0.41 r.
+    """
+    import cv2
+
+    count, labels = cv2.connectedComponents(opened, connectivity=4)
+    label = labels.astype(np.float32)
+    window = _disc(radius)
+    highest = cv2.dilate(label, window)
+    lowest = cv2.erode(np.where(label > 0, label, np.float32(count)), window)
+    restored = (opened > 0) | ((mask > 0) & (highest == lowest))
+    # Restored cells of two regions may still touch.
+    owner = np.where(restored, np.maximum(highest, label), np.float32(0))
+    ring = np.ones((3, 3), np.uint8)
+    apart = cv2.dilate(owner, ring) == cv2.erode(np.where(owner > 0, owner, np.float32(count)), ring)
+    return np.asarray((opened > 0) | (restored & apart))
+
+
+def _cells_inside(polygon: object, grid: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of the cells whose centres lie in a polygon."""
+    xmin, ymin, xmax, ymax = shapely.bounds(polygon)
+    rows, columns = grid.to_pixel([xmin, xmax], [ymax, ymin])
+    first_row, last_row = max(int(rows[0]), 0), min(int(rows[1]) + 1, grid.rows)
+    first_column, last_column = max(int(columns[0]), 0), min(int(columns[1]) + 1, grid.columns)
+    row, column = np.mgrid[first_row:last_row, first_column:last_column]
+    inside = shapely.contains_xy(polygon, *grid.to_world(row + 0.5, column + 0.5))
+    return row[inside], column[inside]
+
+
+def _mean(values: _Floats, cells: tuple[NDArray[np.intp], NDArray[np.intp]]) -> float:
+    chosen = values[cells]
+    chosen = chosen[np.isfinite(chosen)]
+    return float(chosen.mean()) if len(chosen) else math.nan
