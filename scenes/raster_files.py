@@ -20,18 +20,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .crs import crs_label, crs_text, require_metric, same_crs
+from .crs import crs_label, crs_text, same_crs
 from .errors import CRSError, InputError
 from .raster import Elevation, Grid, Image
 
 __all__ = [
     "BANDS",
     "RasterHeader",
+    "band_names",
     "mosaic_elevation",
     "mosaic_image",
     "read_elevation",
     "read_image",
     "read_raster_header",
+    "resampling_note",
+    "warped_extent",
+    "warped_size",
     "write_elevation",
     "write_image",
 ]
@@ -60,6 +64,8 @@ class RasterHeader:
         ``"uint8"``.
     square : bool
         Whether the cells are square.
+    height_unit : str, optional
+        Unit of the values of an elevation model where the file tells another one than metres.
     """
 
     path: Path
@@ -69,6 +75,7 @@ class RasterHeader:
     band_names: tuple[str, ...]
     dtype: str
     square: bool
+    height_unit: str | None
 
 
 def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) -> RasterHeader:
@@ -120,6 +127,7 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
             band_names=tuple((text or "").lower() for text in source.descriptions[:count]),
             dtype=source.dtypes[0],
             square=abs(a + e) <= 1e-6 * a,
+            height_unit=_height_unit(source),
         )
 
 
@@ -175,15 +183,12 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
     return _DEFAULT_BANDS[header.band_count]
 
 
-def mosaic_image(
-    paths: Sequence[str | os.PathLike[str]], grid: Grid, *, crs: str | None, bands: Sequence[str] | None = None
-) -> Image:
-    """Bring one or several orthoimages to `grid` in `crs`, which must be given when a file is in another one.
+def mosaic_image(headers: Sequence[RasterHeader], grid: Grid, *, crs: str, bands: Sequence[str] | None = None) -> Image:
+    """Bring one or several orthoimages to `grid` in `crs`; a file that names no CRS is taken to be in it.
 
     Files whose cells coincide with those of `grid` are copied, others resampled: averaged when their cells are much
     smaller, else bilinear.
     """
-    headers = [read_raster_header(path) for path in paths]
     named = [band_names(header, bands) for header in headers]
     kept = tuple(name for name in named[0] if name != "-")
     for header, names in zip(headers, named, strict=True):
@@ -209,17 +214,49 @@ def mosaic_image(
     return Image(values, kept, grid, None if valid.all() else valid)
 
 
-def mosaic_elevation(paths: Sequence[str | os.PathLike[str]], grid: Grid, *, crs: str | None) -> Elevation:
+def mosaic_elevation(headers: Sequence[RasterHeader], grid: Grid, *, crs: str) -> Elevation:
     """Bring one or several elevation models to `grid` in `crs`; cells without data are NaN."""
     values = np.full(grid.shape, np.nan, dtype=np.float32)
-    for path in paths:
-        header = read_raster_header(path)
+    for header in headers:
         if header.band_count != 1:
             raise InputError(f"{header.path} has {header.band_count} bands, expected an elevation model of one band")
+        if header.height_unit is not None:
+            raise CRSError(
+                f"{header.path}: its heights are in {header.height_unit}, metres are needed: convert them, for "
+                "instance with gdal_calc.py"
+            )
         for rows, columns, block, has_data in _warped(header, [1], grid, crs):
             fresh = has_data & np.isfinite(block[0]) & np.isnan(values[rows, columns])
             values[rows, columns][fresh] = block[0][fresh]
     return Elevation(values, grid)
+
+
+def warped_extent(header: RasterHeader, crs: str) -> tuple[float, float, float, float]:
+    """Return the extent of a raster, ``(xmin, ymin, xmax, ymax)``, in another CRS."""
+    if header.crs is None or same_crs(header.crs, crs):
+        return header.grid.extent
+    from rasterio.errors import RasterioError
+    from rasterio.warp import transform_bounds
+
+    try:
+        bounds: tuple[float, float, float, float] = transform_bounds(header.crs, crs, *header.grid.extent)
+    except RasterioError as error:
+        raise CRSError(
+            f"{header.path} cannot be transformed from {crs_label(header.crs)} to {crs_label(crs)}: "
+            "it is probably in another CRS than it names"
+        ) from error
+    return bounds
+
+
+def warped_size(header: RasterHeader, crs: str) -> float:
+    """Return the cell size in metres, to two digits, that keeps the detail of a raster in another CRS."""
+    if header.crs is None or same_crs(header.crs, crs):
+        return header.grid.gsd
+    from rasterio.warp import calculate_default_transform
+
+    grid = header.grid
+    transform, _, _ = calculate_default_transform(header.crs, crs, grid.columns, grid.rows, *grid.extent)
+    return float(f"{transform.a:.2g}")
 
 
 def write_image(image: Image, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
@@ -301,6 +338,25 @@ def _source_crs(file: Path, source: Any) -> str | None:
     return crs_text(crs)
 
 
+def _height_unit(source: Any) -> str | None:
+    """Return the unit of the values when band or vertical CRS name one that is not metres."""
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError as ProjError
+
+    unit = str(source.units[0] or "")
+    if unit.lower() not in ("", "m", "metre", "metres", "meter", "meters"):
+        return unit
+    try:
+        crs = CRS.from_wkt(source.crs.to_wkt()) if source.crs else None
+    except ProjError:
+        return None
+    for part in crs.sub_crs_list if crs is not None else ():
+        for axis in part.axis_info:
+            if axis.direction == "up" and abs(axis.unit_conversion_factor - 1.0) > 1e-9:
+                return str(axis.unit_name)
+    return None
+
+
 def _band_indexes(names: Sequence[str]) -> tuple[list[int], tuple[str, ...]]:
     indexes = [index for index, name in enumerate(names, start=1) if name != "-"]
     return indexes, tuple(name for name in names if name != "-")
@@ -322,20 +378,15 @@ def _valid(source: Any) -> NDArray[np.bool_] | None:
 
 
 def _warped(
-    header: RasterHeader, indexes: list[int], grid: Grid, crs: str | None
+    header: RasterHeader, indexes: list[int], grid: Grid, crs: str
 ) -> Iterator[tuple[slice, slice, NDArray[Any], NDArray[np.bool_]]]:
     """Yield (rows, columns, values, has data) of the part of `grid` that a file covers, by bands of rows."""
     from rasterio import Affine
     from rasterio.enums import Resampling
     from rasterio.vrt import WarpedVRT
-    from rasterio.warp import transform_bounds
 
-    if crs is None:
-        require_metric(header.crs, str(header.path))
-    warp = crs is not None and header.crs is not None and not same_crs(header.crs, crs)
-    bounds = header.grid.extent
-    if warp:
-        bounds = transform_bounds(header.crs, crs, *bounds, densify_pts=21)
+    warp = header.crs is not None and not same_crs(header.crs, crs)
+    bounds = warped_extent(header, crs)
     columns = _span(bounds[0], bounds[2], grid.west, grid.gsd, grid.columns)
     rows = _span(-bounds[3], -bounds[1], -grid.north, grid.gsd, grid.rows)
     if columns is None or rows is None:
@@ -345,14 +396,13 @@ def _warped(
         resampling = Resampling.average if ratio > 1.5 else Resampling.bilinear
         if not warp and header.square and _same_cells(grid, header.grid):
             resampling = Resampling.nearest
-        common = crs or header.crs
         for start in range(rows.start, rows.stop, 1024):
             stop = min(start + 1024, rows.stop)
             corner = grid.to_world(start, columns.start)
             with WarpedVRT(
                 source,
-                src_crs=header.crs or common or "EPSG:3857",
-                crs=common or "EPSG:3857",  # a stand-in on both sides: no CRS is known and none is applied
+                src_crs=header.crs if warp else crs,
+                crs=crs,
                 transform=Affine(grid.gsd, 0, float(corner[0]), 0, -grid.gsd, float(corner[1])),
                 width=columns.stop - columns.start,
                 height=stop - start,
@@ -381,13 +431,13 @@ def _same_cells(one: Grid, two: Grid) -> bool:
     return abs(one.gsd - two.gsd) <= 1e-6 * one.gsd and bool((abs(shift - np.round(shift)) < 1e-3).all())
 
 
-def crs_message(header: RasterHeader, crs: str, grid: Grid) -> str | None:
+def resampling_note(header: RasterHeader, crs: str, grid: Grid) -> str | None:
     """Return the sentence that tells how a file is brought to a scene's grid, or None when it is copied as it is."""
     reasons = []
     if header.crs is not None and not same_crs(header.crs, crs):
         reasons.append(f"from {crs_label(header.crs)} to {crs_label(crs)}")
     if not header.square or abs(header.grid.gsd - grid.gsd) > 1e-6 * grid.gsd:
-        reasons.append(f"from {header.grid.gsd:g} m to {grid.gsd:g} m cells")
+        reasons.append(f"to cells of {grid.gsd:g} m")
     elif not reasons and not _same_cells(grid, header.grid):
         reasons.append("by a fraction of a cell")
-    return f"{header.path} was resampled {' and '.join(reasons)}" if reasons else None
+    return f"{header.path.name} was resampled {' and '.join(reasons)}" if reasons else None

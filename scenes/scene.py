@@ -79,9 +79,13 @@ class Scene:
         }
         self._content_hash = content_hash
 
+    @property
+    def holdings(self) -> tuple[str, ...]:
+        """What the scene holds, unread: some of ``points``, ``image``, ``dem``, ``reference``, ``area``."""
+        return tuple(name for name, source in self._sources.items() if source is not None)
+
     def __repr__(self) -> str:
-        held = [name for name, source in self._sources.items() if source is not None]
-        return f"<Scene {self.name}: {', '.join(held) or 'empty'}>"
+        return f"<Scene {self.name}: {', '.join(self.holdings) or 'empty'}>"
 
     def _get(self, name: str) -> Any:
         value = self._sources[name]

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from .crs import crs_label, parse_crs, require_metric
+from .crs import crs_label, parse_crs, require_metric, same_crs
 from .errors import CRSError, InputError, OutputError
 from .footprints import Footprints
 from .names import nearest_hint
@@ -50,6 +50,7 @@ def read_footprints(
     layer: str | None = None,
     building_id: str | None = None,
     crs: str | None = None,
+    to_crs: str | None = None,
 ) -> Footprints:
     """Read footprints from a vector file.
 
@@ -64,6 +65,13 @@ def read_footprints(
         used where there is one, else every polygon is its own building. A row with no value is its own building.
     crs : str, optional
         CRS to assign, for files that have none or the wrong one; coordinates are not changed.
+    to_crs : str, optional
+        CRS to transform to; a file of unknown CRS is taken to be in it already.
+
+    Notes
+    -----
+    A GeoJSON file that names no CRS is in degrees by RFC 7946. When its coordinates cannot be degrees, its CRS is
+    taken as not known.
 
     Raises
     ------
@@ -82,8 +90,11 @@ def read_footprints(
         geometries, columns, own_crs = _read_parquet(file)
     else:
         geometries, columns, own_crs = _read_ogr(file, layer)
+    if crs is None and not _in_degrees_at_most(file, own_crs, geometries):
+        own_crs = None
     crs = crs or own_crs
-    _check_coordinates(file, crs, geometries)
+    if to_crs is not None:
+        geometries, crs = _transformed(file, geometries, crs or to_crs, to_crs), to_crs
     require_metric(crs, str(file))
     identifiers = _building_ids(file, columns, building_id)
     footprints = Footprints.of(geometries, building_ids=identifiers, crs=crs, attributes=columns, source=str(file))
@@ -270,13 +281,26 @@ def _building_ids(file: Path, columns: Mapping[str, NDArray[Any]], name: str | N
     return texts.astype(str)
 
 
-def _check_coordinates(file: Path, crs: str | None, geometries: NDArray[np.object_]) -> None:
-    """Tell a GeoJSON without CRS, which counts as WGS 84 (RFC 7946), from one that is in degrees."""
-    if crs != "EPSG:4326" or file.suffix.lower() not in (".json", ".geojson") or not len(geometries):
-        return
+def _in_degrees_at_most(file: Path, crs: str | None, geometries: NDArray[np.object_]) -> bool:
+    """Return False for a GeoJSON whose CRS is the WGS 84 of RFC 7946 but whose coordinates cannot be degrees."""
+    if crs != "EPSG:4326" or DRIVERS.get(file.suffix.lower()) != "GeoJSON":
+        return True
     xmin, ymin, xmax, ymax = shapely.total_bounds(geometries)
-    if max(abs(xmin), abs(xmax)) > 360 or max(abs(ymin), abs(ymax)) > 90:
+    return not (max(abs(xmin), abs(xmax)) > 360 or max(abs(ymin), abs(ymax)) > 90)
+
+
+def _transformed(file: Path, geometries: NDArray[np.object_], crs: str, to_crs: str) -> NDArray[np.object_]:
+    """Return the geometries in another CRS, without Z, axis order x, y on both sides."""
+    import pyproj
+
+    if same_crs(crs, to_crs):
+        return geometries
+    transformer = pyproj.Transformer.from_crs(parse_crs(crs), parse_crs(to_crs), always_xy=True)
+    flat = shapely.force_2d(geometries)
+    moved = shapely.transform(flat, lambda points: np.column_stack(transformer.transform(*points.T)))
+    if (np.isfinite(shapely.get_coordinates(flat)) & ~np.isfinite(shapely.get_coordinates(moved))).any():
         raise CRSError(
-            f"{file} names no CRS, so by RFC 7946 it is {crs_label(crs)}, but its coordinates are not degrees: "
-            "name the CRS with --crs (in Python: crs=)"
+            f"{file}: its coordinates cannot be transformed from {crs_label(crs)} to {crs_label(to_crs)}: "
+            "it is probably in another CRS, name it"
         )
+    return np.asarray(moved, dtype=object)

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from ...scenes.errors import RoofbenchError
-from . import evaluate
+from . import evaluate, scenes
 
 __all__ = ["app", "main"]
 
@@ -25,6 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("evaluate")(evaluate.evaluate)
+app.add_typer(scenes.app)
 
 
 def _version(asked: bool) -> None:

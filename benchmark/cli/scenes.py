@@ -1,0 +1,153 @@
+"""``roofbench scenes``: make, import, check and show scenes, the folders that everything else runs on."""
+
+from __future__ import annotations
+
+import glob
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...scenes.errors import InputError
+
+__all__ = ["app"]
+
+app = typer.Typer(
+    name="scenes",
+    help="Make, import, check and show scenes.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+
+_POINT_ENDINGS = (".las", ".laz")
+_IMAGE_ENDINGS = (".tif", ".tiff", ".vrt", ".jp2", ".png", ".jpg", ".jpeg", ".img")
+
+
+@app.command("import")
+def import_(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Scene folder to make.")],
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(help="Point files (.las, .laz) and orthoimages (.tif, .jp2, ...), sorted by their ending."),
+    ] = None,
+    points: Annotated[
+        list[str] | None, typer.Option(help="LAS, LAZ or COPC file or pattern; may be given several times.")
+    ] = None,
+    ortho: Annotated[list[str] | None, typer.Option(help="Orthoimage or pattern; several are mosaicked.")] = None,
+    dem: Annotated[
+        list[str] | None, typer.Option(help="Bare-earth elevation; derived from the points when not given.")
+    ] = None,
+    reference: Annotated[
+        str | None, typer.Option(help="Reference footprints, any vector format; FILE|layername=NAME for a layer.")
+    ] = None,
+    area: Annotated[str | None, typer.Option(help="Polygons inside which the reference is complete.")] = None,
+    crs: Annotated[str | None, typer.Option(help="CRS of files that name none, for instance EPSG:25832.")] = None,
+    bands: Annotated[
+        str | None, typer.Option(help="Bands of the image in order, e.g. red,green,blue,nir; - skips one.")
+    ] = None,
+    gsd: Annotated[float | None, typer.Option(help="Cell size of the orthoimage, m; default: its own.")] = None,
+    dem_cell: Annotated[float | None, typer.Option(help="Cell size of the DEM, m; default: its own, or 1 m.")] = None,
+    building_id: Annotated[
+        str | None, typer.Option(help="Column of the reference: footprints of one value are one building.")
+    ] = None,
+    reference_from_class: Annotated[
+        bool, typer.Option("--reference-from-class", help="Derive the reference from points of class 6 (building).")
+    ] = False,
+    ortho_from_points: Annotated[
+        bool, typer.Option("--ortho-from-points", help="Derive the orthoimage from coloured points.")
+    ] = False,
+    as_rectangles: Annotated[
+        bool, typer.Option("--as-rectangles", help="Decompose the reference into rectangles with a common building id.")
+    ] = False,
+    extent: Annotated[
+        tuple[float, float, float, float] | None,
+        typer.Option("--extent", "--clip", help="Keep only xmin ymin xmax ymax, metres."),
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the scene; default: that of the folder.")] = None,
+    source: Annotated[str | None, typer.Option(help="Where the data come from, for the manifest.")] = None,
+    licence: Annotated[str | None, typer.Option(help="Licence of the data, for the manifest.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the folder if it exists.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Do not tell what was assigned, mended or derived.")] = False,
+) -> None:
+    """Make a scene folder from point files, orthoimages, footprints.
+
+    Example: roofbench scenes import tiles/*.laz --crs EPSG:28992 --reference register.gpkg -o delft
+    """
+    from ...scenes.importing import import_scene
+
+    loose_points, loose_images = _sorted_by_ending(_expanded(files))
+    with _point_bar() as progress:
+        scene = import_scene(
+            output,
+            points=[*_expanded(points), *loose_points],
+            ortho=[*_expanded(ortho), *loose_images],
+            dem=_expanded(dem),
+            reference=reference,
+            area=area,
+            crs=crs,
+            bands=None if bands is None else [band.strip() for band in bands.split(",")],
+            gsd=gsd,
+            dem_cell=dem_cell,
+            building_id=building_id,
+            reference_from_class=reference_from_class,
+            ortho_from_points=ortho_from_points,
+            as_rectangles=as_rectangles,
+            extent=extent,
+            name=name,
+            source=source,
+            licence=licence,
+            overwrite=overwrite,
+            note=(lambda _: None) if quiet else (lambda sentence: typer.echo(f"- {sentence}", err=True)),
+            progress=progress,
+        )
+    typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.holdings)}")
+
+
+def _expanded(patterns: list[str] | None) -> list[str]:
+    """Return the files of names and patterns, those of a pattern in alphabetical order."""
+    found = []
+    for pattern in patterns or []:
+        if glob.has_magic(pattern) and not Path(pattern).exists():
+            matches = sorted(glob.glob(pattern, recursive=True))
+            if not matches:
+                raise InputError(f"{pattern}: no file matches this pattern")
+            found.extend(matches)
+        else:
+            found.append(pattern)
+    return found
+
+
+def _sorted_by_ending(files: list[str]) -> tuple[list[str], list[str]]:
+    points = [file for file in files if file.lower().endswith(_POINT_ENDINGS)]
+    images = [file for file in files if file.lower().endswith(_IMAGE_ENDINGS)]
+    for file in files:
+        if file not in points and file not in images:
+            raise InputError(
+                f"{file} ends neither as a point file (.las, .laz) nor as an image: name it with --points, --ortho, "
+                "--dem, --reference or --area"
+            )
+    return points, images
+
+
+@contextmanager
+def _point_bar() -> Iterator[Callable[[int, int], None] | None]:
+    """Yield a function that moves a progress bar; None when standard error is no terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task: Any = None
+
+        def move(done: int, total: int) -> None:
+            nonlocal task
+            if task is None:
+                task = bar.add_task("reading points", total=total)
+            bar.update(task, completed=done)
+
+        yield move
