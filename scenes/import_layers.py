@@ -289,6 +289,7 @@ def text(extent: Sequence[float]) -> str:
 
 
 def common(one: Extent, two: Extent) -> Extent | None:
+    """Return what two extents share, or None when they are apart."""
     xmin, ymin = max(one[0], two[0]), max(one[1], two[1])
     xmax, ymax = min(one[2], two[2]), min(one[3], two[3])
     return (xmin, ymin, xmax, ymax) if xmax > xmin and ymax > ymin else None

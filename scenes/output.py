@@ -15,10 +15,11 @@ from pathlib import Path
 
 from .errors import OutputError
 
-__all__ = ["whole_file", "whole_folder"]
+__all__ = ["check_target", "whole_file", "whole_folder"]
 
 
-def _check_target(path: Path, overwrite: bool) -> None:
+def check_target(path: Path, overwrite: bool) -> None:
+    """Raise `OutputError` when a file or folder cannot be written; call it before long work."""
     if path.exists() and not overwrite:
         raise OutputError(f"{path} exists already: add --overwrite (in Python: overwrite=True) or name another file")
     if not path.parent.is_dir():
@@ -34,7 +35,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     Side files are files that a driver writes beside the one it was told: ``.dbf``, ``.shx``, ``.aux.xml``.
     """
     target = Path(path)
-    _check_target(target, overwrite)
+    check_target(target, overwrite)
     if target.is_dir():
         raise OutputError(f"{target} is a folder: name a file")
     with _scratch(target) as scratch:
@@ -50,7 +51,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
 def whole_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
     """Yield a temporary folder; on success it replaces `path`."""
     target = Path(path)
-    _check_target(target, overwrite)
+    check_target(target, overwrite)
     if target.exists() and not target.is_dir():
         raise OutputError(f"{target} is a file: name a folder")
     with _scratch(target) as scratch:

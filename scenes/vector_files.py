@@ -14,13 +14,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from .crs import crs_label, parse_crs, require_metric, same_crs
+from .crs import common_crs, crs_label, parse_crs, require_metric, same_crs
 from .errors import CRSError, InputError, OutputError
 from .footprints import Footprints
 from .names import nearest_hint
 from .output import whole_file
 
-__all__ = ["DRIVERS", "read_footprints", "split_layer", "write_footprints", "write_layers"]
+__all__ = ["DRIVERS", "read_footprints", "read_polygon", "split_layer", "write_footprints", "write_layers"]
 
 #: File ending to GDAL driver; GeoParquet is read and written by geopandas (extra ``parquet``).
 DRIVERS: Mapping[str, str] = {
@@ -95,13 +95,35 @@ def read_footprints(
     crs = crs or own_crs
     if to_crs is not None:
         geometries, crs = _transformed(file, geometries, crs or to_crs, to_crs), to_crs
-    require_metric(crs, str(file))
+    if len(geometries):
+        require_metric(crs, str(file))
     identifiers = _building_ids(file, columns, building_id)
     footprints = Footprints.of(geometries, building_ids=identifiers, crs=crs, attributes=columns, source=str(file))
     if len(geometries) and not len(footprints):
         kinds = sorted({repair.problem for repair in footprints.repairs})
         raise InputError(f"{file}: no polygons among {len(geometries)} features ({'; '.join(kinds[:3])})")
     return footprints
+
+
+def read_polygon(
+    path: str | os.PathLike[str], *, crs: str | None = None, common_with: Footprints | None = None
+) -> shapely.Geometry:
+    """Read an area: the union of all polygons of a file.
+
+    Parameters
+    ----------
+    path : path
+    crs : str, optional
+        CRS to assign.
+    common_with : Footprints, optional
+        Set whose CRS the file must share.
+    """
+    footprints = read_footprints(path, crs=crs)
+    if not len(footprints):
+        raise InputError(f"{path}: no polygons: an evaluation area needs at least one")
+    if common_with is not None and len(common_with):
+        common_crs(footprints.crs, common_with.crs, (footprints.source, common_with.source))
+    return shapely.union_all(footprints.polygons)
 
 
 def write_footprints(
@@ -214,6 +236,7 @@ def _write_ogr(
             driver=driver,
             geometry_type=kind,
             promote_to_multi=kind.startswith("Multi"),
+            field_mask=[np.ma.getmaskarray(column) for column in columns.values()] if columns else None,
             crs=crs,
             append=append,
             **({"SPATIAL_INDEX": "NO"} if driver == "FlatGeobuf" and not len(geometries) else {}),
@@ -250,7 +273,7 @@ def _crs_text(crs: Any) -> str | None:
 
 def _storable(column: NDArray[Any]) -> NDArray[Any]:
     """Return a column of a type that GDAL knows: text as objects, all integers as int64."""
-    values = np.asarray(column)
+    values = np.ma.getdata(column)
     if values.dtype.kind in "US":
         return values.astype(object)
     if values.dtype.kind == "O":

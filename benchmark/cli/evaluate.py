@@ -2,6 +2,90 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-def evaluate() -> None:
-    """Compare detected with reference footprints."""
+import typer
+
+__all__ = ["evaluate"]
+
+
+def evaluate(
+    detected: Annotated[str, typer.Argument(help="Detected footprints; 'file.gpkg|layername=NAME' names a layer.")],
+    reference: Annotated[str, typer.Argument(help="Reference footprints.")],
+    evaluator: Annotated[
+        str, typer.Option("--evaluator", "-e", help="Evaluator, as name or name[parameter=value].")
+    ] = "threshold-free",
+    matching: Annotated[
+        Literal["nearest", "one-pass", "overlap"] | None, typer.Option(help="How partners are chosen [nearest].")
+    ] = None,
+    area: Annotated[
+        Literal["exact", "pixels"] | None, typer.Option(help="Areas by polygon overlay or by pixel centres [exact].")
+    ] = None,
+    gsd: Annotated[float | None, typer.Option(help="Pixel size in metres, for --area pixels.")] = None,
+    minimum_area: Annotated[float | None, typer.Option(help="Ignore references below this area, m2.")] = None,
+    evaluation_area: Annotated[
+        str | None, typer.Option(help="Vector file with the polygon inside which the reference is complete.")
+    ] = None,
+    building_id: Annotated[
+        str | None, typer.Option(help="Reference column that joins the parts of one building.")
+    ] = None,
+    crs: Annotated[
+        str | None, typer.Option(help="CRS of the files that name none or a wrong one, such as EPSG:25832.")
+    ] = None,
+    form: Annotated[
+        Literal["table", "json", "csv", "md"], typer.Option("--format", "-f", help="How the result is printed.")
+    ] = "table",
+    verdicts: Annotated[
+        Path | None, typer.Option(help="Write a verdict with its reason for every object (.gpkg: two layers).")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw a map of the verdicts (.png, .svg, .pdf).")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace output files that exist.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing on standard error.")] = False,
+) -> None:
+    """Compare detected with reference footprints: 15 indices, and why each object is right or wrong.
+
+    Files may be GeoJSON, GeoPackage, Shapefile, FlatGeobuf or GeoParquet, in a projected CRS in metres.
+    """
+    from ...evaluators.registry import make_evaluator
+    from ...reports.evaluation_text import format_evaluation
+    from ...scenes.errors import UnsupportedError
+    from ...scenes.output import check_target
+    from ...scenes.vector_files import read_footprints, read_polygon
+
+    chosen: dict[str, Any] = {"matching": matching, "area": area, "gsd": gsd, "minimum_area": minimum_area}
+    given = {name: str(value) for name, value in chosen.items() if value is not None}
+    judge = make_evaluator(evaluator, given)
+    for target in (verdicts, plot):
+        if target is not None:
+            check_target(target, overwrite)
+    found = read_footprints(detected, crs=crs)
+    truth = read_footprints(reference, crs=crs, building_id=building_id)
+    boundary = read_polygon(evaluation_area, crs=crs, common_with=truth) if evaluation_area else None
+    if not quiet:
+        for footprints in (found, truth):
+            for repair in footprints.repairs[:10]:
+                typer.echo(f"{footprints.source}: {repair}", err=True)
+            if not len(footprints):
+                typer.echo(f"{footprints.source}: no footprints", err=True)
+    result = judge.evaluate(found, truth, area=boundary)
+    title = f"{_short(detected)} against {_short(reference)}"
+    if verdicts is not None or plot is not None:
+        objects = result.verdicts
+        if objects is None:
+            raise UnsupportedError(f"the evaluator {judge.name!r} gives no verdicts: leave out --verdicts and --plot")
+        if verdicts is not None:
+            from ...reports.verdict_layers import write_verdicts
+
+            write_verdicts(objects, verdicts, crs=truth.crs or found.crs, overwrite=overwrite)
+        if plot is not None:
+            from ...reports.figures import save_figure
+            from ...reports.verdict_map import verdict_figure
+
+            save_figure(verdict_figure(result, title=title, area=boundary), plot, overwrite=overwrite)
+    typer.echo(format_evaluation(result, form, title=title))
+
+
+def _short(path: str) -> str:
+    """Return the file name and layer without the folder."""
+    return path.replace("\\", "/").rpartition("/")[2]

@@ -23,6 +23,8 @@ app = typer.Typer(
     help="Evaluation-first benchmark for building detection from airborne LiDAR and orthoimagery.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    # Plain help: markup would swallow the brackets of name[parameter=value].
+    rich_markup_mode=None,
 )
 app.command("evaluate")(evaluate.evaluate)
 app.add_typer(scenes.app)

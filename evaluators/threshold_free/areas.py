@@ -8,21 +8,31 @@ With d and r the two sides of a matched (TP) pair:
 
 Multiple detections are ignored (Awrangjeb et al. 2010, section 4.2.2).
 
-Nearly all footprints share no area with another one of their own set, and for these T, F and M follow from the areas
-and from the pairs' shared areas by subtraction. Only groups that do share area are united as polygons, so the cost
-grows with the number of overlaps.
+Since d is the union of (d minus r) and (d and r), F is the area of the union of all TP and FP detections less T, and M
+that of all TP and FN references less T. So three union areas are all that is needed. A union area is the sum of the
+areas less what is shared; polygons are united only where three or more of them meet, so the cost grows with the number
+of overlaps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...scenes.footprints import Footprints
+from .convex import convex_intersection_areas
+from .overlap import Overlaps, quadrilateral_rows
+
 __all__ = ["AreaTally", "exact_areas"]
+
+
+#: Pairs (first, second) of members that share area, and how much, m2.
+_Conflicts: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -45,128 +55,131 @@ class AreaTally:
     pair_shared: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One set of footprints as the overlay needs it: those that count, and the pairs of them that share area."""
-
-    polygons: NDArray[np.object_]
-    counts: NDArray[np.bool_]
-    partner_polygon: NDArray[np.object_]
-    shared_with_partner: NDArray[np.float64]
-    conflicts: tuple[NDArray[np.int64], NDArray[np.int64]]
-
-
 def exact_areas(
-    detected: NDArray[np.object_],
-    reference: NDArray[np.object_],
+    detected: Footprints,
+    reference: Footprints,
     pairs: tuple[NDArray[np.int64], NDArray[np.int64]],
     shared: NDArray[np.float64],
     *,
     false_positives: NDArray[np.int64],
     false_negatives: NDArray[np.int64],
-    detected_conflicts: tuple[NDArray[np.int64], NDArray[np.int64]],
-    reference_conflicts: tuple[NDArray[np.int64], NDArray[np.int64]],
+    within: tuple[Overlaps, Overlaps],
 ) -> AreaTally:
     """Return T, F and M.
 
     Parameters
     ----------
-    detected, reference : ndarray of polygons
+    detected, reference : Footprints
     pairs : tuple of ndarray of int64, shape (n,)
         Rows (detections, references) of the TP pairs.
     shared : ndarray, shape (n,)
         Area of (d and r) of each pair, m2.
     false_positives, false_negatives : ndarray of int64
         Rows of the FP detections and of the FN references.
-    detected_conflicts, reference_conflicts : tuple of ndarray of int64
-        Pairs of rows within one set that share any area.
+    within : tuple of Overlaps
+        Pairs of detections, and pairs of references, that share any area.
     """
     detections, references = pairs
-    one = _side(detected, reference, detections, references, shared, false_positives, detected_conflicts)
-    two = _side(reference, detected, references, detections, shared, false_negatives, reference_conflicts)
-    pair_detected, pair_reference = shapely.area(detected[detections]), shapely.area(reference[references])
+    conflicts = (
+        _counted(within[0], detections, false_positives, len(detected)),
+        _counted(within[1], references, false_negatives, len(reference)),
+    )
+    pair_conflicts = _pair_conflicts(detected, reference, pairs, conflicts)
+
+    def pair_ground(group: list[int]) -> NDArray[np.object_]:
+        common: NDArray[np.object_] = shapely.intersection(
+            detected.polygons[detections[group]], reference.polygons[references[group]]
+        )
+        return common
+
+    true_positive = _union_area(shared, pair_conflicts, pair_ground)
+    beyond = []
+    for footprints, own, unmatched, conflict in (
+        (detected, detections, false_positives, conflicts[0]),
+        (reference, references, false_negatives, conflicts[1]),
+    ):
+        areas = np.zeros(len(footprints))
+        areas[own], areas[unmatched] = footprints.areas[own], footprints.areas[unmatched]
+        whole = _union_area(areas, conflict, footprints.polygons.__getitem__)
+        # Equal sets leave nothing, whatever the rounding of the sums.
+        rest = whole - true_positive
+        beyond.append(rest if rest > 1e-13 * whole else 0.0)
     return AreaTally(
-        true_positive=_united_pairs(detected, reference, pairs, shared, one, two),
-        false_positive=_beyond_partner(one),
-        false_negative=_beyond_partner(two),
-        pair_detected=float(pair_detected.sum()),
-        pair_reference=float(pair_reference.sum()),
+        true_positive=true_positive,
+        false_positive=beyond[0],
+        false_negative=beyond[1],
+        pair_detected=float(detected.areas[detections].sum()),
+        pair_reference=float(reference.areas[references].sum()),
         pair_shared=float(shared.sum()),
     )
 
 
-def _side(
-    polygons: NDArray[np.object_],
-    others: NDArray[np.object_],
-    own: NDArray[np.int64],
-    partners: NDArray[np.int64],
-    shared: NDArray[np.float64],
-    unmatched: NDArray[np.int64],
-    conflicts: tuple[NDArray[np.int64], NDArray[np.int64]],
-) -> _Side:
-    counts = np.zeros(len(polygons), dtype=bool)
-    counts[own] = counts[unmatched] = True
-    partner_polygon = np.full(len(polygons), None, dtype=object)
-    partner_polygon[own] = others[partners]
-    shared_with_partner = np.zeros(len(polygons))
-    shared_with_partner[own] = shared
-    both = counts[conflicts[0]] & counts[conflicts[1]]
-    return _Side(polygons, counts, partner_polygon, shared_with_partner, (conflicts[0][both], conflicts[1][both]))
+def _counted(within: Overlaps, matched: NDArray[np.int64], unmatched: NDArray[np.int64], count: int) -> _Conflicts:
+    """Return (first, second, area) of the overlaps between footprints that count for the areas."""
+    counts = np.zeros(count, dtype=bool)
+    counts[matched] = counts[unmatched] = True
+    both = counts[within.first] & counts[within.second]
+    return within.first[both], within.second[both], within.area[both]
 
 
-def _united_pairs(
-    detected: NDArray[np.object_],
-    reference: NDArray[np.object_],
+def _pair_conflicts(
+    detected: Footprints,
+    reference: Footprints,
     pairs: tuple[NDArray[np.int64], NDArray[np.int64]],
-    shared: NDArray[np.float64],
-    one: _Side,
-    two: _Side,
+    conflicts: tuple[_Conflicts, ...],
+) -> _Conflicts:
+    """Return TP pairs (first, second) whose true positive ground may overlap, and how much it does.
+
+    Two pairs can share such ground only where both their detections and their references share area.
+    """
+    n = len(pairs[0])
+    keys = []
+    for members, footprints, (one, two, _) in zip(pairs, (detected, reference), conflicts, strict=True):
+        number = np.full(len(footprints), -1, dtype=np.int64)
+        number[members] = np.arange(n)
+        first, second = np.sort([number[one], number[two]], axis=0)
+        keys.append((first * n + second)[first >= 0])
+    common = np.intersect1d(*keys)
+    first, second = common // max(n, 1), common % max(n, 1)
+    rows = [
+        (footprints, members[side])
+        for footprints, members in zip((detected, reference), pairs, strict=True)
+        for side in (first, second)
+    ]
+    return first, second, _shared_by_four(rows)
+
+
+def _shared_by_four(rows: list[tuple[Footprints, NDArray[np.int64]]]) -> NDArray[np.float64]:
+    """Return the area common to four footprints, given as four (set, rows)."""
+    corner_rows = [quadrilateral_rows(footprints)[index] for footprints, index in rows]
+    quick = np.all([row >= 0 for row in corner_rows], axis=0)
+    areas = np.empty(len(quick))
+    corners = [footprints.quadrilaterals[1][row[quick]] for (footprints, _), row in zip(rows, corner_rows, strict=True)]
+    areas[quick] = convex_intersection_areas(*corners)
+    common = None
+    for footprints, index in rows:
+        polygons = footprints.polygons[index[~quick]]
+        common = polygons if common is None else shapely.intersection(common, polygons)
+    areas[~quick] = shapely.area(common)
+    return areas
+
+
+def _union_area(
+    areas: NDArray[np.float64],
+    conflicts: _Conflicts,
+    polygons_of: Callable[[list[int]], NDArray[np.object_]],
 ) -> float:
-    """T: two pairs can share ground only where both their detections and their references do."""
-    of_detection = dict(zip(pairs[0].tolist(), range(len(pairs[0])), strict=True)) if len(one.conflicts[0]) else {}
-    of_reference = dict(zip(pairs[1].tolist(), range(len(pairs[1])), strict=True)) if len(two.conflicts[0]) else {}
-    among_detections = _named_pairs(one.conflicts, of_detection)
-    links = among_detections & _named_pairs(two.conflicts, of_reference)
-    alone = np.ones(len(shared), dtype=bool)
-    total = 0.0
-    for group in _groups(links):
-        alone[group] = False
-        total += shapely.area(
-            shapely.union_all(shapely.intersection(detected[pairs[0][group]], reference[pairs[1][group]]))
-        )
-    return float(total + shared[alone].sum())
+    """Return the area of a union of members with these areas, of which some pairs share area.
 
-
-def _beyond_partner(side: _Side) -> float:
-    """F or M: what the counted footprints of one side cover beyond their partners, less what is true positive."""
-    alone = side.counts.copy()
-    total = 0.0
-    for group in _groups(zip(side.conflicts[0].tolist(), side.conflicts[1].tolist(), strict=True)):
-        alone[group] = False
-        polygons, partners = side.polygons[group], side.partner_polygon[group]
-        matched = np.array([partner is not None for partner in partners], dtype=bool)
-        beyond = polygons.copy()
-        beyond[matched] = shapely.difference(polygons[matched], partners[matched])
-        true = shapely.union_all(shapely.intersection(polygons[matched], partners[matched]))
-        total += shapely.area(shapely.difference(shapely.union_all(beyond), true))
-    rows = np.flatnonzero(alone)
-    areas = shapely.area(side.polygons[rows])
-    rest = areas - side.shared_with_partner[rows]
-    # A footprint equal to its partner leaves nothing, whatever the rounding of the two areas.
-    rest[rest <= 1e-12 * areas] = 0.0
-    return float(total + rest.sum())
-
-
-def _named_pairs(
-    conflicts: tuple[NDArray[np.int64], NDArray[np.int64]], number: dict[int, int]
-) -> set[tuple[int, int]]:
-    """Return the conflicts between matched footprints as (lower, higher) pair numbers."""
-    named = set()
-    for one, two in zip(conflicts[0].tolist(), conflicts[1].tolist(), strict=True):
-        if one in number and two in number:
-            first, second = number[one], number[two]
-            named.add((first, second) if first < second else (second, first))
-    return named
+    `polygons_of` gives the polygons of a list of members; it is asked only where three or more of them meet.
+    """
+    first, second, shared = conflicts
+    meeting = np.bincount(np.concatenate([first, second]), minlength=len(areas))
+    simple = (meeting[first] == 1) & (meeting[second] == 1)
+    total = float(areas.sum() - shared[simple].sum())
+    for group in _groups(zip(first[~simple].tolist(), second[~simple].tolist(), strict=True)):
+        total += shapely.area(shapely.union_all(polygons_of(group))) - areas[group].sum()
+    return float(total)
 
 
 def _groups(links: Iterable[tuple[int, int]]) -> list[list[int]]:

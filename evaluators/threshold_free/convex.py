@@ -15,18 +15,18 @@ __all__ = ["convex_intersection_areas"]
 _CHUNK = 1 << 14
 
 
-def convex_intersection_areas(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the intersection area of each pair of convex quadrilaterals.
+def convex_intersection_areas(first: NDArray[np.float64], *others: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the area that convex quadrilaterals have in common, for many sets of them at once.
 
     Parameters
     ----------
-    first, second : ndarray, shape (n, 4, 2)
-        Corners in counter-clockwise order, metres.
+    first, *others : ndarray, each of shape (n, 4, 2)
+        Corners in counter-clockwise order, metres; row i of all arrays is one set.
 
     Returns
     -------
     ndarray, shape (n,)
-        Square metres; 0 for pairs that touch or are apart.
+        Square metres; 0 for quadrilaterals that touch or are apart.
 
     Examples
     --------
@@ -37,44 +37,46 @@ def convex_intersection_areas(first: NDArray[np.float64], second: NDArray[np.flo
     areas = np.empty(len(first))
     for start in range(0, len(first), _CHUNK):
         part = slice(start, start + _CHUNK)
-        # Coordinates from a corner of the pair keep all digits however far the scene is from the origin of its CRS.
-        origin = second[part, :1]
-        areas[part] = _clip(first[part] - origin, second[part] - origin)
+        # Coordinates from a corner of the set keep all digits however far the scene is from the origin of its CRS.
+        origin = first[part, :1]
+        x, y = np.moveaxis(first[part] - origin, 2, 0)
+        for window in others:
+            x, y = _clip(x, y, window[part] - origin)
+        doubled = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+        areas[part] = np.maximum(doubled, 0.0) / 2
     return areas
 
 
-def _clip(subject: NDArray[np.float64], window: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sutherland-Hodgman: clip by each edge's left half plane; vertices beyond `count` repeat the first one."""
-    n = len(subject)
-    x, y = subject[..., 0], subject[..., 1]
+def _clip(
+    x: NDArray[np.float64], y: NDArray[np.float64], window: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Clip convex rings by the left half plane of each edge of their window (Sutherland & Hodgman 1974).
+
+    Rings have shape (n, vertices); a ring with fewer vertices repeats its first one at the end.
+    """
     for edge in range(4):
         ax, ay = window[:, edge, 0, None], window[:, edge, 1, None]
         dx = window[:, (edge + 1) % 4, 0, None] - ax
         dy = window[:, (edge + 1) % 4, 1, None] - ay
         side = dx * (y - ay) - dy * (x - ax)
         inside = side >= 0
-        next_x, next_y = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
-        next_side, next_inside = np.roll(side, -1, axis=1), np.roll(inside, -1, axis=1)
-        crossing = inside != next_inside
+        next_x, next_y, next_side = (np.roll(array, -1, axis=1) for array in (x, y, side))
+        crossing = inside != (next_side >= 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             along = np.where(crossing, side / (side - next_side), 0.0)
-        vertices = x.shape[1]
+        n, vertices = x.shape
         # Each old vertex yields up to two new ones: itself when inside, and the crossing of the edge that follows.
         out_x, out_y = np.empty((n, 2 * vertices)), np.empty((n, 2 * vertices))
         keep = np.empty((n, 2 * vertices), dtype=bool)
         out_x[:, 0::2], out_y[:, 0::2], keep[:, 0::2] = x, y, inside
         out_x[:, 1::2], out_y[:, 1::2] = x + along * (next_x - x), y + along * (next_y - y)
         keep[:, 1::2] = crossing
-        place = np.cumsum(keep, axis=1) - 1
         # A half plane adds at most one vertex to a convex ring.
-        new_x, new_y = np.zeros((n, vertices + 1)), np.zeros((n, vertices + 1))
+        place = np.cumsum(keep, axis=1) - 1
         row, slot = np.nonzero(keep & (place <= vertices))
         target = place[row, slot]
+        new_x, new_y = np.zeros((n, vertices + 1)), np.zeros((n, vertices + 1))
         new_x[row, target], new_y[row, target] = out_x[row, slot], out_y[row, slot]
-        count = np.minimum(place[:, -1] + 1, vertices + 1)
-        empty = np.arange(vertices + 1) >= count[:, None]
-        x = np.where(empty, new_x[:, :1], new_x)
-        y = np.where(empty, new_y[:, :1], new_y)
-    doubled = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
-    areas: NDArray[np.float64] = np.maximum(doubled, 0.0) / 2
-    return areas
+        spare = np.arange(vertices + 1) > place[:, -1:]
+        x, y = np.where(spare, new_x[:, :1], new_x), np.where(spare, new_y[:, :1], new_y)
+    return x, y

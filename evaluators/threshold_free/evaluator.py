@@ -26,7 +26,7 @@ from .areas import AreaTally, exact_areas
 from .correspondence import MATCHINGS, Correspondence, match
 from .geometric import pair_distances
 from .indices import COUNTS, INDICES, index_values
-from .overlap import Overlaps, overlaps_between, overlaps_within
+from .overlap import Overlaps, overlaps_between, overlaps_within, shared_areas
 from .pixels import pixel_areas
 from .verdicts import ObjectGraph, verdict_tables
 
@@ -124,7 +124,8 @@ class ThresholdFree(Evaluator):
         grid: Grid | None = None,
     ) -> ThresholdFreeEvaluation:
         """Compare two sets; see `Evaluator.evaluate`."""
-        common_crs(detected.crs, reference.crs, (detected.source, reference.source))
+        if len(detected) and len(reference):
+            common_crs(detected.crs, reference.crs, (detected.source, reference.source))
         lattice = self._lattice(grid)
         if area is not None:
             shapely.prepare(area)
@@ -148,7 +149,10 @@ class ThresholdFree(Evaluator):
             (counted_detections, counted_references),
             within_detected.only_significant,
         )
+        by_pixels = lattice if self._by_pixels(grid) else None
         tallies |= {
+            "scenes.all": 1.0,
+            "scenes.by_pixels": float(by_pixels is not None),
             "left_out.detected": float((~counted_detections).sum()),
             "left_out.reference_outside": float((reference_reason == _OUTSIDE).sum()),
             "left_out.reference_small": float((reference_reason == _SMALL).sum()),
@@ -161,7 +165,7 @@ class ThresholdFree(Evaluator):
             (counted_detections, counted_references),
             (within_detected, within_reference),
             area,
-            lattice if self._by_pixels(grid) else None,
+            by_pixels,
         )
         distances_of_pairs = pair_distances(detected, reference, correspondence.pairs)
         squared = distances_of_pairs.outline**2
@@ -335,34 +339,43 @@ def _areas(
     false_negatives = np.flatnonzero(counted[1] & (correspondence.of_reference < 0))
     is_match = correspondence.of_detection[overlaps.first] == overlaps.second
     shared = overlaps.area[is_match]
-    one, two = detected.polygons, reference.polygons
     if area is not None:
-        one, one_changed = _clipped(one, area)
-        two, two_changed = _clipped(two, area)
-        changed = one_changed[pairs[0]] | two_changed[pairs[1]]
-        shared[changed] = shapely.area(shapely.intersection(one[pairs[0][changed]], two[pairs[1][changed]]))
+        detected, reference = _clipped(detected, area), _clipped(reference, area)
+        shared = shared_areas(detected, reference, *pairs)
+        within = _remeasured(detected, within[0]), _remeasured(reference, within[1])
     if lattice is not None:
-        tally = pixel_areas(one, two, pairs, lattice, false_positives=false_positives, false_negatives=false_negatives)
+        tally = pixel_areas(
+            detected.polygons,
+            reference.polygons,
+            pairs,
+            lattice,
+            false_positives=false_positives,
+            false_negatives=false_negatives,
+        )
     else:
         tally = exact_areas(
-            one,
-            two,
+            detected,
+            reference,
             pairs,
             shared,
             false_positives=false_positives,
             false_negatives=false_negatives,
-            detected_conflicts=(within[0].first, within[0].second),
-            reference_conflicts=(within[1].first, within[1].second),
+            within=within,
         )
     return {f"areas.{name}": getattr(tally, name) for name in AreaTally.__dataclass_fields__}
 
 
-def _clipped(polygons: NDArray[np.object_], area: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.bool_]]:
-    """Return the parts inside the area, and which polygons are changed by it."""
-    changed: NDArray[np.bool_] = ~shapely.contains_properly(area, polygons)
-    inside = polygons.copy()
-    inside[changed] = shapely.intersection(polygons[changed], area)
-    return inside, changed
+def _clipped(footprints: Footprints, area: shapely.Geometry) -> Footprints:
+    """Return the footprints cut at the evaluation area; those outside become empty."""
+    crossing = ~shapely.contains_properly(area, footprints.polygons)
+    inside = footprints.polygons.copy()
+    inside[crossing] = shapely.intersection(inside[crossing], area)
+    return Footprints(polygons=inside, crs=footprints.crs, source=footprints.source)
+
+
+def _remeasured(footprints: Footprints, within: Overlaps) -> Overlaps:
+    area = shared_areas(footprints, footprints, within.first, within.second)
+    return Overlaps(within.first, within.second, area, within.significant)
 
 
 def _pair_iou(
@@ -388,6 +401,11 @@ def _tally_notes(tallies: Mapping[str, float]) -> Iterator[str]:
     def number(key: str) -> int:
         return int(tallies.get(key, 0))
 
+    scenes, by_pixels = number("scenes.all"), number("scenes.by_pixels")
+    if scenes == 1:
+        yield "areas counted in pixels" if by_pixels else "areas exact, by polygon overlay"
+    elif scenes:
+        yield f"areas counted in pixels in {by_pixels} of {scenes} scenes, exact in the others"
     if number("left_out.detected"):
         yield f"{number('left_out.detected')} detections left out"
     if number("left_out.reference_outside"):

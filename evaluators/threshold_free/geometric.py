@@ -14,6 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ...scenes.footprints import Footprints
+from .overlap import quadrilateral_rows
 
 __all__ = ["PairDistances", "corner_distances", "pair_distances", "polis_distances"]
 
@@ -43,13 +44,11 @@ def pair_distances(
     detected: Footprints, reference: Footprints, pairs: tuple[NDArray[np.int64], NDArray[np.int64]]
 ) -> PairDistances:
     """Measure matched pairs, given as rows (detections, references)."""
-    corners, rows = [], []
-    for footprints, members in zip((detected, reference), pairs, strict=True):
-        index, all_corners = footprints.quadrilaterals
-        row = np.full(len(footprints), -1, dtype=np.int64)
-        row[index] = np.arange(len(index))
-        corners.append(all_corners)
-        rows.append(row[members])
+    corners = [footprints.quadrilaterals[1] for footprints in (detected, reference)]
+    rows = [
+        quadrilateral_rows(footprints)[members]
+        for footprints, members in zip((detected, reference), pairs, strict=True)
+    ]
     both = (rows[0] >= 0) & (rows[1] >= 0)
     polis = np.empty(len(pairs[0]))
     outline = np.empty(len(pairs[0]))

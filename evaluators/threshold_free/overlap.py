@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...scenes.footprints import Footprints
 from .convex import convex_intersection_areas
 
-__all__ = ["NUMERICAL_ZERO", "Overlaps", "overlaps_between", "overlaps_within"]
+__all__ = ["NUMERICAL_ZERO", "Overlaps", "overlaps_between", "overlaps_within", "quadrilateral_rows", "shared_areas"]
 
 #: Share of the smaller area up to which an intersection is rounding (evaluation.md, section 1).
 NUMERICAL_ZERO = 1e-6
@@ -74,29 +74,34 @@ def overlaps_within(footprints: Footprints) -> Overlaps:
     return _measured(footprints, footprints, first[once], second[once])
 
 
-def _measured(one: Footprints, two: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]) -> Overlaps:
-    order = np.lexsort((second, first))
-    first, second = first[order].astype(np.int64), second[order].astype(np.int64)
-    area = np.zeros(len(first))
-    rectangle_one, rectangle_two = _corner_rows(one), _corner_rows(two)
-    row_one, row_two = rectangle_one[first], rectangle_two[second]
-    convex = (row_one >= 0) & (row_two >= 0)
+def shared_areas(
+    one: Footprints, two: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the area that footprint `first` of one set shares with `second` of the other, m2, shape (n,)."""
+    areas = np.empty(len(first))
+    row_one, row_two = quadrilateral_rows(one)[first], quadrilateral_rows(two)[second]
     corners_one, corners_two = one.quadrilaterals[1], two.quadrilaterals[1]
+    convex = (row_one >= 0) & (row_two >= 0)
     for start in range(0, len(first), _CHUNK):
         part = slice(start, start + _CHUNK)
         quick = np.flatnonzero(convex[part]) + start
-        area[quick] = convex_intersection_areas(corners_one[row_one[quick]], corners_two[row_two[quick]])
+        areas[quick] = convex_intersection_areas(corners_one[row_one[quick]], corners_two[row_two[quick]])
         slow = np.flatnonzero(~convex[part]) + start
-        shared = shapely.intersection(one.polygons[first[slow]], two.polygons[second[slow]])
-        area[slow] = shapely.area(shared)
-    smaller = np.minimum(one.areas[first], two.areas[second])
-    found = Overlaps(first, second, area, area > NUMERICAL_ZERO * smaller)
-    return found.where(area > 0)
+        areas[slow] = shapely.area(shapely.intersection(one.polygons[first[slow]], two.polygons[second[slow]]))
+    return areas
 
 
-def _corner_rows(footprints: Footprints) -> NDArray[np.int64]:
-    """Return for each footprint its row among the convex quadrilaterals, or -1."""
+def quadrilateral_rows(footprints: Footprints) -> NDArray[np.int64]:
+    """Return for each footprint its row among the convex quadrilaterals of its set, or -1."""
     rows = np.full(len(footprints), -1, dtype=np.int64)
     index = footprints.quadrilaterals[0]
     rows[index] = np.arange(len(index))
     return rows
+
+
+def _measured(one: Footprints, two: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]) -> Overlaps:
+    order = np.lexsort((second, first))
+    first, second = first[order].astype(np.int64), second[order].astype(np.int64)
+    area = shared_areas(one, two, first, second)
+    smaller = np.minimum(one.areas[first], two.areas[second])
+    return Overlaps(first, second, area, area > NUMERICAL_ZERO * smaller).where(area > 0)

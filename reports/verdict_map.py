@@ -1,0 +1,243 @@
+"""Maps of verdicts: where the detections are right, where they are wrong, and the indices beside it.
+
+Colours are those of Okabe & Ito, told apart by people who see red and green alike; false negatives are hatched too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.path import Path as Outline
+from numpy.typing import NDArray
+
+from ..evaluators.base import Evaluation, Verdicts
+from .evaluation_text import described, format_value
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["VERDICT_STYLE", "add_scale_bar", "draw_verdicts", "outlines", "verdict_figure"]
+
+#: Verdict to (colour, hatch, what it means).
+VERDICT_STYLE = {
+    "TP": ("#009E73", None, "TP: detected building"),
+    "MD": ("#E69F00", None, "MD: multiple detection"),
+    "FP": ("#D55E00", None, "FP: false alarm"),
+    "FN": ("#0072B2", "////", "FN: missed reference"),
+    "left out": ("#BBBBBB", None, "left out"),
+}
+
+
+def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry | None = None) -> Figure:
+    """Return a figure: the map of TP, MD, FP and FN with scale bar and legend, and the index table beside it.
+
+    Footprints that lie in places far apart get a map for each place (the nine with most objects), since on one map
+    of all nothing would be seen.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        With verdicts (not a pooled one).
+    title : str
+    area : polygon, optional
+        Evaluation area, drawn dashed.
+    """
+    verdicts = evaluation.verdicts
+    if verdicts is None:
+        raise ValueError("a pooled evaluation has no verdicts to draw")
+    figure = Figure(figsize=(13, 8), dpi=110, layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=[2.4, 1], squeeze=False)[0]
+    figure.suptitle(_shortened(title, 150), x=0.01, ha="left", fontsize=11, parse_math=False)
+    places, total = _places(verdicts)
+    columns = math.ceil(math.sqrt(len(places)))
+    grid = left.subplots(math.ceil(len(places) / columns), columns, squeeze=False)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    handles: dict[str, Any] = {}
+    for number, (axes, extent) in enumerate(zip(grid.flat, places, strict=False)):
+        axes.set_axis_on()
+        if total > 1:
+            axes.set_title(f"place {number + 1} of {total}", fontsize=9, loc="left")
+        for handle in draw_verdicts(axes, verdicts, extent=extent, area=area):
+            handles[str(handle.get_label())] = handle
+    order = {label: place for place, (_, _, label) in enumerate(VERDICT_STYLE.values())}
+    shown = sorted(handles.values(), key=lambda handle: order.get(str(handle.get_label()).partition(" (")[0], 9))
+    if shown:
+        left.legend(handles=shown, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    _draw_indices(right.subplots(), evaluation)
+    return figure
+
+
+def draw_verdicts(
+    axes: Axes,
+    verdicts: Verdicts,
+    *,
+    extent: tuple[float, float, float, float] | None = None,
+    area: shapely.Geometry | None = None,
+) -> list[Patch]:
+    """Draw verdicts on map axes with a scale bar; return the handles for a legend.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    verdicts : Verdicts
+    extent : tuple of float, optional
+        ``(xmin, ymin, xmax, ymax)`` to show; all footprints by default.
+    area : polygon, optional
+        Evaluation area, drawn dashed.
+    """
+    tables = (verdicts.references, verdicts.detections)
+    every = np.concatenate([table["geometry"].to_numpy() for table in tables])
+    if extent is None:
+        extent = tuple(shapely.total_bounds(np.append(every, area) if area is not None else every))
+    if not np.isfinite(extent).all():
+        axes.text(0.5, 0.5, "no footprints on either side", ha="center", va="center", transform=axes.transAxes)
+        axes.set_axis_off()
+        return []
+    pad = 0.03 * max(extent[2] - extent[0], extent[3] - extent[1], 1.0)
+    axes.set_xlim(extent[0] - pad, extent[2] + pad)
+    axes.set_ylim(extent[1] - pad, extent[3] + pad)
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    handles: list[Patch] = []
+    window = shapely.box(*extent)
+    for table, shown in zip(tables, (("left out", "FN"), ("left out", "TP", "MD", "FP")), strict=True):
+        for verdict in shown:
+            chosen = table["geometry"].to_numpy()[(table["verdict"] == verdict).to_numpy()]
+            if len(chosen):
+                handles.append(_draw_group(axes, chosen, verdict, window))
+    references = verdicts.references
+    matched = references["geometry"].to_numpy()[(references["verdict"] == "TP").to_numpy()]
+    if len(matched):
+        visible = matched[shapely.intersects(matched, window)]
+        axes.add_collection(PathCollection(list(outlines(visible)), facecolor="none", edgecolor="black", linewidth=0.7))
+        handles.append(Patch(facecolor="none", edgecolor="black", label=f"reference of a TP ({len(matched):,})"))
+    if area is not None:
+        axes.add_collection(
+            PathCollection(list(outlines([area])), facecolor="none", edgecolor="#555555", linestyle="--", linewidth=1)
+        )
+        handles.append(Patch(facecolor="none", edgecolor="#555555", linestyle="--", label="evaluation area"))
+    add_scale_bar(axes)
+    return handles
+
+
+def outlines(polygons: Iterable[Any]) -> Iterable[Outline]:
+    """Yield a matplotlib path for each polygon; holes stay open."""
+    for polygon in polygons:
+        rings = [np.asarray(ring.coords) for ring in shapely.get_rings(shapely.get_parts(polygon))]
+        if rings:
+            vertices = np.concatenate(rings)
+            codes = np.concatenate([_ring_codes(len(ring)) for ring in rings])
+            yield Outline(vertices, codes)
+
+
+def add_scale_bar(axes: Axes) -> None:
+    """Draw a bar of a round length, about a fifth of the map's width, in the lower left corner."""
+    (xmin, xmax), (ymin, ymax) = axes.get_xlim(), axes.get_ylim()
+    width, height = xmax - xmin, ymax - ymin
+    target = width / 5
+    step = 10 ** math.floor(math.log10(target))
+    length = max(factor * step for factor in (1, 2, 5) if factor * step <= target)
+    x, y = xmin + 0.03 * width, ymin + 0.03 * height
+    axes.add_patch(
+        Rectangle(
+            (x - 0.01 * width, y - 0.012 * height),
+            length + 0.02 * width,
+            0.06 * height,
+            color="white",
+            alpha=0.8,
+            zorder=5,
+        )
+    )
+    axes.add_patch(Rectangle((x, y), length, 0.008 * height, color="black", zorder=6))
+    label = f"{length / 1000:g} km" if length >= 1000 else f"{length:g} m"
+    axes.text(x + length / 2, y + 0.013 * height, label, ha="center", va="bottom", fontsize=9, zorder=6)
+
+
+def _ring_codes(count: int) -> NDArray[np.uint8]:
+    codes = np.full(count, Outline.LINETO, dtype=np.uint8)
+    codes[0], codes[-1] = Outline.MOVETO, Outline.CLOSEPOLY
+    return codes
+
+
+def _places(verdicts: Verdicts) -> tuple[list[tuple[float, float, float, float] | None], int]:
+    """Return the extents to draw, at most nine, and how many there are: one, unless footprints are too small to see."""
+    every = np.concatenate([verdicts.detections["geometry"].to_numpy(), verdicts.references["geometry"].to_numpy()])
+    if not len(every):
+        return [None], 1
+    xmin, ymin, xmax, ymax = shapely.total_bounds(every)
+    span = max(xmax - xmin, ymax - ymin)
+    if np.sqrt(np.median(shapely.area(every))) > span / 300:
+        return [None], 1
+    from scipy import ndimage
+
+    centres = shapely.get_coordinates(shapely.centroid(every))
+    cells = np.floor((centres - [xmin, ymin]) / span * 50).astype(int)
+    occupied = np.zeros((52, 52), dtype=bool)
+    occupied[cells[:, 0], cells[:, 1]] = True
+    label = ndimage.label(occupied, structure=np.ones((3, 3)))[0][cells[:, 0], cells[:, 1]]
+    numbers, counts = np.unique(label, return_counts=True)
+    extents = [tuple(shapely.total_bounds(every[label == number])) for number in numbers[np.argsort(-counts)]]
+    covered = sum((extent[2] - extent[0]) * (extent[3] - extent[1]) for extent in extents[:9])
+    if covered > 0.3 * (xmax - xmin) * (ymax - ymin):
+        return [None], 1
+    return list(extents[:9]), len(extents)
+
+
+def _shortened(text: str, width: int) -> str:
+    return text if len(text) <= width else text[: width // 2] + " … " + text[-width // 2 :]
+
+
+def _draw_group(axes: Axes, polygons: NDArray[np.object_], verdict: str, window: shapely.Geometry) -> Patch:
+    colour, hatch, label = VERDICT_STYLE[verdict]
+    face = to_rgba(colour, 0.35 if hatch or verdict == "left out" else 0.75)
+    visible = polygons[shapely.intersects(polygons, window)]
+    axes.add_collection(
+        PathCollection(list(outlines(visible)), facecolor=face, edgecolor=colour, hatch=hatch, linewidth=0.6)
+    )
+    return Patch(label=f"{label} ({len(polygons):,})", facecolor=face, edgecolor=colour, hatch=hatch, linewidth=0.6)
+
+
+def _draw_indices(axes: Axes, evaluation: Evaluation) -> None:
+    """Write the principal indices, the counts' parameters and the notes."""
+    axes.set_axis_off()
+    rows = [
+        (index.title, index.symbol, format_value(evaluation.values[index.key], index.unit))
+        for index in evaluation.evaluator.indices
+        if index.main
+    ]
+    table = axes.table(
+        cellText=rows,
+        colLabels=("index", "symbol", "value"),
+        colWidths=(0.6, 0.17, 0.26),
+        cellLoc="left",
+        loc="upper center",
+    )
+    table.auto_set_font_size(False)
+    table.set_fontsize(9)
+    table.scale(1, 1.35)
+    for (row, column), cell in table.get_celld().items():
+        cell.set_edgecolor("#CCCCCC")
+        cell.visible_edges = "B"
+        if row == 0:
+            cell.set_text_props(weight="bold")
+        if column == 2:
+            cell.set_text_props(ha="right")
+    notes = [described(evaluation), *evaluation.notes]
+    text = "\n".join(_wrapped(note, 58) for note in notes[:6])
+    axes.text(0.0, 0.2, text, transform=axes.transAxes, fontsize=8, va="top", color="#444444", parse_math=False)
+
+
+def _wrapped(text: str, width: int) -> str:
+    import textwrap
+
+    return "\n".join(textwrap.wrap(text, width, break_long_words=True))
