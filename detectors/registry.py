@@ -15,7 +15,9 @@ DETECTORS = Registry(
     "roofbench.detectors",
     Detector,
     {
+        "improved": "detectors.lines.improved:Improved",
         "ndsm": "detectors.ndsm:NDSM",
+        "original": "detectors.lines.original:Original",
     },
 )
 

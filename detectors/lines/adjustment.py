@@ -1,0 +1,98 @@
+"""Adjustment: turning lines parallel or perpendicular to a reference line.
+
+The *rotation* of a line towards a reference is the smallest angle that makes both parallel or perpendicular, in
+(-45, 45] degrees. All rotations are taken between the directions as fitted, so the result does not depend on the order.
+Sources: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.2 (references in the neighbourhood); Awrangjeb, Zhang &
+Fraser (2011), section 3.3 (the longest line of the same black shape).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .boxes import OX, OY, UX, UY, Boxes, lengths
+
+__all__ = ["adjust_to_neighbours", "adjust_to_shape", "rotate"]
+
+
+@njit(cache=True)
+def rotation_between(direction: float, reference: float) -> float:
+    """Return the angle that turns `direction` parallel or perpendicular to `reference`, radians in (-pi/4, pi/4]."""
+    quarter = math.pi / 2
+    turn = (reference - direction) % quarter
+    return turn - quarter if turn > math.pi / 4 else turn
+
+
+@njit(cache=True)
+def _nearest_rotations(
+    lines: NDArray[np.float64], order: NDArray[np.int64], radius: float, tolerance: float, longer_only: bool
+) -> NDArray[np.float64]:
+    n = len(lines)
+    angles = np.arctan2(lines[:, UY], lines[:, UX])
+    rotation = np.full(n, np.nan)
+    for place in range(n):
+        i = order[place]
+        for other in range(place + 1 if longer_only else 0, n):
+            j = order[other]
+            if i == j or math.hypot(lines[i, OX] - lines[j, OX], lines[i, OY] - lines[j, OY]) > radius:
+                continue
+            turn = rotation_between(angles[j], angles[i])
+            if abs(turn) <= tolerance and not abs(turn) >= abs(rotation[j]):
+                rotation[j] = turn
+        # The longest line of a neighbourhood is its own reference.
+        if longer_only and math.isnan(rotation[i]):
+            for other in range(place + 1, n):
+                j = order[other]
+                if math.hypot(lines[i, OX] - lines[j, OX], lines[i, OY] - lines[j, OY]) <= radius and (
+                    abs(rotation_between(angles[j], angles[i])) <= tolerance
+                ):
+                    rotation[i] = 0.0
+                    break
+    return rotation
+
+
+def by_length(lines: Boxes) -> NDArray[np.int64]:
+    """Return the order from the longest line to the shortest; equal lengths keep their order."""
+    return np.argsort(-lengths(lines), kind="stable").astype(np.int64)
+
+
+def adjust_to_neighbours(lines: Boxes, *, radius: float, tolerance: float, longer_only: bool) -> NDArray[np.float64]:
+    """Return the smallest rotation of each line towards a line whose centre is near, radians, NaN without any.
+
+    Parameters
+    ----------
+    radius : float
+        Largest distance of the centres, pixels.
+    tolerance : float
+        Largest rotation, radians.
+    longer_only : bool
+        Whether only longer lines are references; else every line is one for every other.
+    """
+    rotation: NDArray[np.float64] = _nearest_rotations(lines, by_length(lines), radius, tolerance, longer_only)
+    return rotation
+
+
+def adjust_to_shape(lines: Boxes, shapes: NDArray[np.int64], *, tolerance: float) -> NDArray[np.float64]:
+    """Return the rotation of each line towards the longest line of its shape, radians, NaN beyond `tolerance`."""
+    rotation = np.full(len(lines), np.nan)
+    base: dict[int, int] = {}
+    angles = np.arctan2(lines[:, UY], lines[:, UX])
+    for i in by_length(lines):
+        reference = base.setdefault(int(shapes[i]), int(i))
+        turn = rotation_between(angles[i], angles[reference])
+        if abs(turn) <= tolerance:
+            rotation[i] = turn
+    return rotation
+
+
+def rotate(lines: Boxes, rotation: NDArray[np.float64]) -> Boxes:
+    """Return the lines turned about their centres, which must be their origins."""
+    turned = lines.copy()
+    cos, sin = np.cos(rotation), np.sin(rotation)
+    turned[:, UX] = lines[:, UX] * cos - lines[:, UY] * sin
+    turned[:, UY] = lines[:, UX] * sin + lines[:, UY] * cos
+    return turned

@@ -1,0 +1,133 @@
+"""Dominant colours of a rectangle: which values of Y, I and Q its roof has.
+
+Nouns
+-----
+YIQ
+    Intensity Y in [0, 1], hue I in [-0.5957, 0.5957] and saturation Q in [-0.5226, 0.5226] of a colour (NTSC), as the
+    paper names them; their histograms have 10, 20 and 20 bins.
+part
+    Run of histogram bins around one peak, from minimum to minimum; a minimum belongs to the part on its left.
+range
+    The bins of a part that hold at least 97 % of it, taken from its peak outwards, the larger neighbour first.
+dominant
+    The ranges of the largest parts, until these parts hold 90 % of the rectangle. Their union is a lookup table.
+
+Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.4.1.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .boxes import column_range, row_range
+
+__all__ = ["BINS", "Colours", "dominant_bins", "dominant_ranges", "yiq_bins"]
+
+#: Bins of Y, I and Q.
+BINS = (10, 20, 20)
+_I_RANGE = 0.5957
+_Q_RANGE = 0.5226
+
+
+class Colours(NamedTuple):
+    """Red, green and blue of the orthoimage.
+
+    Attributes
+    ----------
+    values : ndarray of uint8 or uint16, shape (3, rows, columns)
+    full : float
+        Value of full brightness: 255 or 65535.
+    """
+
+    values: NDArray[np.uint8] | NDArray[np.uint16]
+    full: float
+
+
+@njit(cache=True)
+def yiq_bins(colours: Colours, row: int, column: int) -> tuple[int, int, int]:
+    """Return the histogram bins of Y, I and Q of one cell."""
+    r = colours.values[0, row, column] / colours.full
+    g = colours.values[1, row, column] / colours.full
+    b = colours.values[2, row, column] / colours.full
+    y = 0.299 * r + 0.587 * g + 0.114 * b
+    i = 0.595716 * r - 0.274453 * g - 0.321263 * b
+    q = 0.211456 * r - 0.522591 * g + 0.311135 * b
+    return (
+        min(max(int(y * 10), 0), 9),
+        min(max(int((i + _I_RANGE) / (2 * _I_RANGE) * 20), 0), 19),
+        min(max(int((q + _Q_RANGE) / (2 * _Q_RANGE) * 20), 0), 19),
+    )
+
+
+@njit(cache=True)
+def split_parts(histogram: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the first bin of each part and, at the end, the number of bins; parts are cut after minima."""
+    bins = len(histogram)
+    cuts = [0]
+    lowest = 0
+    falling = False
+    for k in range(1, bins):
+        if histogram[k] < histogram[k - 1]:
+            falling, lowest = True, k
+        elif histogram[k] > histogram[k - 1]:
+            if falling:
+                cuts.append(lowest + 1)
+            falling = False
+    cuts.append(bins)
+    return np.array(cuts, dtype=np.int64)
+
+
+@njit(cache=True)
+def dominant_bins(histogram: NDArray[np.int64], part_share: float, total_share: float) -> NDArray[np.bool_]:
+    """Return which bins of a histogram belong to its dominant ranges."""
+    cuts = split_parts(histogram)
+    parts = len(cuts) - 1
+    totals = np.empty(parts, dtype=np.int64)
+    for p in range(parts):
+        totals[p] = histogram[cuts[p] : cuts[p + 1]].sum()
+    within = np.zeros(len(histogram), dtype=np.bool_)
+    wanted, used = total_share * histogram.sum(), 0
+    for p in np.argsort(-totals, kind="mergesort"):
+        if totals[p] == 0 or (used > 0 and used >= wanted):
+            break
+        first, end = cuts[p], cuts[p + 1]
+        low = high = first + np.argmax(histogram[first:end])
+        held = histogram[low]
+        while held < part_share * totals[p]:
+            left = histogram[low - 1] if low > first else -1
+            right = histogram[high + 1] if high + 1 < end else -1
+            if left > right:
+                low -= 1
+                held += left
+            else:
+                high += 1
+                held += right
+        within[low : high + 1] = True
+        used += totals[p]
+    return within
+
+
+@njit(cache=True)
+def dominant_ranges(
+    colours: Colours, box: NDArray[np.float64], part_share: float, total_share: float
+) -> NDArray[np.bool_]:
+    """Return the lookup table of the colours that dominate a box, shape (3, 20): Y, I, Q by bin."""
+    rows, columns = colours.values.shape[1], colours.values.shape[2]
+    histograms = np.zeros((3, 20), dtype=np.int64)
+    first_row, last_row = row_range(box)
+    for row in range(max(first_row, 0), min(last_row, rows)):
+        first, last = column_range(box, row)
+        for column in range(max(first, 0), min(last, columns)):
+            y, i, q = yiq_bins(colours, row, column)
+            histograms[0, y] += 1
+            histograms[1, i] += 1
+            histograms[2, q] += 1
+    within = np.zeros((3, 20), dtype=np.bool_)
+    for band in range(3):
+        bins = BINS[band]
+        within[band, :bins] = dominant_bins(histograms[band, :bins], part_share, total_share)
+    return within

@@ -1,0 +1,168 @@
+"""Corners of curves by chord-to-point distance accumulation (CPDA).
+
+Nouns
+-----
+chord
+    Straight line between two points of a curve that are L curve points apart.
+accumulated distance
+    h_L(k) = | sum of the signed distances of point k from the chords of length L that slide over it |: large where the
+    curve turns, and much less noisy than curvature by derivatives.
+candidate
+    Local maximum, along a curve, of the squared displacement between two smoothings (sigma 4 and 3).
+
+A candidate is a corner when the product of its accumulated distances for three chord lengths, each divided by its
+maximum along the curve, exceeds a threshold, and when the curve turns there by enough. Source: Awrangjeb, Lu, Fraser &
+Ravanbakhsh (2009), the corner detector that the 2010 paper names in section 3.3.1.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .contours import Curves, smooth
+
+__all__ = ["CHORDS", "find_corners"]
+
+#: Chord lengths, curve points.
+CHORDS = (10, 20, 30)
+#: How much wider the second smoothing is that candidates are found by, curve points.
+_WIDER = 1.0
+
+
+@njit(cache=True)
+def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -> NDArray[np.float64]:
+    """Return h_L(k) for every point of one curve, shape (n,); chords that leave an open curve are left out."""
+    n = len(curve)
+    out = np.zeros(n)
+    for start in range(n if closed else n - chord):
+        end = (start + chord) % n
+        dx, dy = curve[end, 0] - curve[start, 0], curve[end, 1] - curve[start, 1]
+        norm = math.hypot(dx, dy)
+        if norm < 1e-9:
+            continue
+        for step in range(1, chord):
+            k = (start + step) % n
+            out[k] += ((curve[k, 0] - curve[start, 0]) * dy - (curve[k, 1] - curve[start, 1]) * dx) / norm
+    return np.abs(out)
+
+
+@njit(cache=True)
+def _turn(curve: NDArray[np.float64], before: int, at: int, after: int) -> float:
+    """Return the angle by which the path before -> at -> after turns, degrees, 0 = straight on."""
+    ax, ay = curve[at, 0] - curve[before, 0], curve[at, 1] - curve[before, 1]
+    bx, by = curve[after, 0] - curve[at, 0], curve[after, 1] - curve[at, 1]
+    return abs(math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by)))
+
+
+@njit(cache=True)
+def _neighbours(corners: list[int], i: int, n: int, arm: int, closed: bool) -> tuple[int, int]:
+    """Return the points that the angle of corner i is measured to: the corners beside it, or `arm` points away."""
+    at = corners[i]
+    if closed:
+        if len(corners) >= 3:
+            return corners[i - 1], corners[(i + 1) % len(corners)]
+        arm = min(arm, n // 3)
+        return (at - arm) % n, (at + arm) % n
+    before = corners[i - 1] if i > 0 else 0
+    after = corners[i + 1] if i + 1 < len(corners) else n - 1
+    return before, after
+
+
+@njit(cache=True)
+def corners_of_curve(
+    curve: NDArray[np.float64],
+    wider: NDArray[np.float64],
+    closed: bool,
+    chords: tuple[int, int, int],
+    product: float,
+    least_turn: float,
+) -> NDArray[np.int64]:
+    """Return the indices of the corners of one curve, in order; `wider` is the same curve smoothed more."""
+    n = len(curve)
+    strength = np.ones(n)
+    for chord in chords:
+        span = min(chord, n // 2)
+        if span < 2:
+            return np.empty(0, dtype=np.int64)
+        h = accumulated_distance(curve, span, closed)
+        highest = h.max()
+        if highest > 0:
+            h /= highest
+        strength *= h
+    moved = np.sum((curve - wider) ** 2, axis=1)
+    corners = [0 for _ in range(0)]
+    for k in range(n):
+        if closed:
+            is_peak = moved[k] > moved[k - 1] and moved[k] >= moved[(k + 1) % n]
+        else:
+            is_peak = 0 < k < n - 1 and moved[k] > moved[k - 1] and moved[k] >= moved[k + 1]
+        if is_peak and strength[k] > product:
+            corners.append(k)
+    # The flattest corner goes first, because its going changes the angles of its neighbours.
+    while len(corners) > 0:
+        flattest, flattest_turn = -1, least_turn
+        for i in range(len(corners)):
+            before, after = _neighbours(corners, i, n, chords[2], closed)
+            turn = _turn(curve, before, corners[i], after)
+            if turn < flattest_turn:
+                flattest, flattest_turn = i, turn
+        if flattest < 0:
+            break
+        corners.pop(flattest)
+    return np.array(corners, dtype=np.int64)
+
+
+@njit(cache=True)
+def _corners_of_all(
+    points: NDArray[np.float64],
+    wider: NDArray[np.float64],
+    offsets: NDArray[np.int64],
+    closed: bool,
+    chords: tuple[int, int, int],
+    product: float,
+    least_turn: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    found = np.empty(len(points), dtype=np.int64)
+    out_offsets = np.zeros(len(offsets), dtype=np.int64)
+    n = 0
+    for i in range(len(offsets) - 1):
+        first, last = offsets[i], offsets[i + 1]
+        corners = corners_of_curve(points[first:last], wider[first:last], closed, chords, product, least_turn)
+        found[n : n + len(corners)] = corners
+        n += len(corners)
+        out_offsets[i + 1] = n
+    return found[:n].copy(), out_offsets
+
+
+def find_corners(
+    curves: Curves, *, sigma: float, product: float, straight: tuple[float, float]
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Smooth the curves and find their corners.
+
+    Parameters
+    ----------
+    sigma : float
+        Of the Gaussian that the curves are smoothed with, curve points.
+    product : float
+        Least product of the three normalised accumulated distances.
+    straight : tuple of float
+        Interior angles that are no corner, degrees: 157 to 203.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 2)
+        The smoothed curves.
+    corners : ndarray of int64
+        Indices within their curve.
+    offsets : ndarray of int64, shape (curves + 1,)
+        Corners of curve i are ``corners[offsets[i]:offsets[i + 1]]``.
+    """
+    points = smooth(curves, sigma)
+    wider = smooth(curves, sigma + _WIDER)
+    least_turn = min(180.0 - straight[0], straight[1] - 180.0)
+    corners, offsets = _corners_of_all(points, wider, curves.offsets, curves.closed, CHORDS, product, least_turn)
+    return points, corners, offsets

@@ -1,0 +1,321 @@
+"""What both line detectors share: their parameters, the rasters they read, and the steps before and after the lines.
+
+Parameters that a paper prints in pixels of its images are declared in those (`PAPER_PIXEL`, 0.15 m) or in metres, never
+in pixels of the scene at hand, so that the same values serve any ground sampling distance.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scenes.footprints import Footprints
+from ...scenes.parameters import parameter
+from ...scenes.raster import Image
+from ...scenes.scene import Scene
+from ..base import Detector, Step
+from .adjustment import by_length
+from .boxes import OX, OY, Boxes, box_corners, lengths, prefix_sums
+from .colours import Colours
+from .contours import SAMPLE, trace_shapes
+from .corners import find_corners
+from .extension import Cover, Growth, extend_lines
+from .final import FinalRules, final_rectangles
+from .masks import Masks, build_masks, ground_heights, point_spacing
+from .rectangles import INSIDE, initial_rectangles
+from .segments import Segments, fit_segments, inside_first
+from .trace import Fate
+from .vegetation import vegetation_prefix
+
+if TYPE_CHECKING:
+    from .trace import Trace
+
+__all__ = ["PAPER_PIXEL", "LineDetector", "Rasters"]
+
+#: Ground sampling distance that the 2010 paper's pixel counts refer to, metres.
+PAPER_PIXEL = 0.15
+#: Threshold that no mean reaches: entropy is not used.
+_NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Rasters:
+    """What the steps read of a scene.
+
+    Attributes
+    ----------
+    image : Image
+    masks : Masks
+    cover : Cover
+    colours : Colours
+    spacing : float
+        Point spacing, metres.
+    """
+
+    image: Image
+    masks: Masks
+    cover: Cover
+    colours: Colours
+    spacing: float
+
+    @property
+    def gsd(self) -> float:
+        """Ground sampling distance, metres."""
+        return self.image.grid.gsd
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineDetector(Detector):
+    """Parameters and shared steps of the detectors `original` and `improved`."""
+
+    requires: ClassVar[tuple[str, ...]] = ("points", "colour", "dem")
+
+    ground: str = parameter(
+        "tile-dem",
+        choices=("tile-dem", "tile-mode", "point-dem"),
+        doc="ground height: mean DEM of the tile, most frequent height of the tile's points, or DEM under the point",
+        source="2010, 3.2; conference version, 3.1; 2011, 3.1",
+    )
+    tile_size: float = parameter(
+        450, unit="px of 0.15 m", minimum=20, swept=(400, 450, 500, 550, 600),
+        doc="side of the tiles that a ground height is estimated for", source="2010, 3.2 and 4.4.1",
+    )  # fmt: skip
+    height: float = parameter(
+        2.5, unit="m", minimum=0, doc="least height above ground of a building", source="2010, 3.2"
+    )
+    neighbourhood: float | None = parameter(
+        None, unit="m", minimum=0,
+        doc="side of the square that a point marks in the masks; none: 1.5 point spacings, the paper's 5 px of 0.15 m",
+        source="2010, 3.2",
+    )  # fmt: skip
+    minimum_side: float = parameter(
+        3.0, unit="m", minimum=0, doc="least length and width of a building; shorter edges and lines are dropped",
+        source="2010, 3.3.1",
+    )  # fmt: skip
+    smoothing: float = parameter(
+        3.0, unit="px of 0.15 m", minimum=0, doc="sigma of the Gaussian along a curve", source="2010, 3.3.1"
+    )
+    corner_product: float = parameter(
+        0.2, minimum=0, maximum=1, doc="least product of the three normalised accumulated chord distances",
+        source="CPDA, 2009",
+    )  # fmt: skip
+    corner_angle: float = parameter(
+        157.0, unit="deg", minimum=90, maximum=180,
+        doc="interior angles from this to its explement (203) are no corner", source="CPDA, 2009",
+    )  # fmt: skip
+    inside_reach: float = parameter(
+        3.0,
+        unit="px of 0.15 m",
+        minimum=0,
+        doc="distance of the inside point from its line",
+        source="2010, 3.3.1; reading",
+    )
+    vegetation: str = parameter(
+        "green-red", choices=("green-red", "pseudo-ndvi"),
+        doc="index on images without near infrared: (G-R)/(G+R), or the printed (R-G)/(R+G)",
+        source="2010, 4.3; reading",
+    )  # fmt: skip
+    vegetation_threshold: float = parameter(
+        48.0, minimum=0, maximum=255, swept=(32, 40, 48, 56, 64),
+        doc="mean vegetation index (0..255) above which a place is vegetation", source="2010, 3.3.1 and 4.4.1",
+    )  # fmt: skip
+    band_width: float = parameter(
+        3.0, unit="m", minimum=0.1, doc="width of the rectangle beside a line whose vegetation index is tested",
+        source="2010, 3.3.1",
+    )  # fmt: skip
+    adjustment_angle: float = parameter(
+        22.5, unit="deg", minimum=0, maximum=45, doc="largest rotation of a line to be parallel or perpendicular",
+        source="2010, 3.3.2",
+    )  # fmt: skip
+    extension: float = parameter(
+        3.0, unit="m", minimum=0.1, doc="depth and first step of the extension of lines and initial rectangles",
+        source="2010, 3.3.2",
+    )  # fmt: skip
+    extension_stop: float | None = parameter(
+        None, unit="m", minimum=0.01,
+        doc="step below which a line or initial rectangle stands; none: 0.8 point spacings",
+        source="2010, 3.3.2: 0.4 m at a spacing of 0.5 m",
+    )  # fmt: skip
+    extension_black: float = parameter(
+        0.7, minimum=0, maximum=1, swept=(0.6, 0.7, 0.8, 0.9), doc="least share of black in a step of that extension",
+        source="2010, 3.3.2",
+    )  # fmt: skip
+    initial_width: float = parameter(
+        1.5, unit="m", minimum=0.1, doc="width of a rectangle before it is extended", source="2010, 3.3.3"
+    )
+    inside_margin: float | None = parameter(
+        None, unit="m", minimum=0,
+        doc="how far outside a rectangle a line counts as in it; none: point spacing + a pixel; not in the print",
+        source="2010, 3.3.3; reading",
+    )  # fmt: skip
+    reduction: float = parameter(
+        0.15, minimum=0, maximum=0.9, swept=(0.10, 0.15, 0.20, 0.25, 0.30),
+        doc="share by which length and width of initial rectangles shrink", source="2010, 3.4.1 and 4.4.1",
+    )  # fmt: skip
+    part_share: float = parameter(
+        0.97,
+        minimum=0,
+        maximum=1,
+        doc="share of a part of a colour histogram that its range holds",
+        source="2010, 3.4.1",
+    )
+    total_share: float = parameter(
+        0.90, minimum=0, maximum=1, doc="share of the rectangle that the parts used hold", source="2010, 3.4.1"
+    )
+    strip: float = parameter(
+        0.35, unit="m", minimum=0.01, doc="first step of the final extension", source="2010, 3.4.2"
+    )
+    colour_similarity: float = parameter(
+        0.4, minimum=0, maximum=1, swept=(0.2, 0.3, 0.4, 0.5, 0.6),
+        doc="least share of a step in the dominant range of Y, I and Q each", source="2010, 3.4.2 and 4.4.1",
+    )  # fmt: skip
+    black_share: float = parameter(
+        0.9, minimum=0, maximum=1, swept=(0.6, 0.7, 0.8, 0.9, 1.0),
+        doc="least share of a step that is black in the secondary mask", source="2010, 3.4.2 and 4.4.1",
+    )  # fmt: skip
+    gap_share: float = parameter(
+        0.1, minimum=0, maximum=1, doc="primary black below which the next rise ends a side", source="2010, 3.4.2"
+    )
+    rise: float = parameter(
+        0.1, minimum=0, maximum=1, doc="largest increase of primary black that is no rise; the print has none",
+        source="2010, 3.4.2; reading",
+    )  # fmt: skip
+    compare: str = parameter(
+        "shrunk", choices=("shrunk", "whole"),
+        doc="size of an initial rectangle in the test that drops it when it lies wholly inside a final one",
+        source="2010, 3.4; reading",
+    )  # fmt: skip
+
+    @abstractmethod
+    def run(self, rasters: Rasters) -> Trace:
+        """Run all steps that follow the masks, keeping the intermediate results."""
+
+    def trace(self, scene: Scene) -> Trace:
+        """Detect, and return every intermediate result."""
+        scene.require(self.requires)
+        return self.run(self._rasters(scene))
+
+    def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
+        """Return the rectangles of the buildings; overlapping ones are parts of one building, or one seen twice."""
+        found = self.trace(scene)
+        corners = box_corners(found.final)
+        x, y = found.grid.to_world(corners[..., 1], corners[..., 0])
+        rectangles = np.stack([x, y], axis=-1)
+        return Footprints.from_rectangles(rectangles, crs=scene.crs, metadata=found.counts(), source=self.name)
+
+    def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
+        """Yield pictures of the masks, the lines, the rectangles and, where used, the votes and the histograms."""
+        from .drawing import draw_steps
+
+        yield from draw_steps(self.trace(scene))
+
+    def _rasters(self, scene: Scene) -> Rasters:
+        points, image = scene.points, scene.image
+        assert points is not None
+        assert image is not None
+        grid = image.grid
+        tile_side = self.tile_size * PAPER_PIXEL
+        spacing = point_spacing(points, grid)
+        ground = (
+            ground_heights(points, scene.dem, method=self.ground, tile_side=tile_side) if len(points) else np.empty(0)
+        )
+        masks = build_masks(
+            points,
+            ground + self.height,
+            grid,
+            neighbourhood=1.5 * spacing if self.neighbourhood is None else self.neighbourhood,
+        )
+        cover = Cover(prefix_sums(masks.primary), vegetation_prefix(image, self.vegetation), self._entropy(image))
+        bands = [image.bands.index(name) for name in ("red", "green", "blue")]
+        rgb = image.values[:3] if bands == [0, 1, 2] else image.values[bands]
+        return Rasters(image, masks, cover, Colours(rgb, float(np.iinfo(rgb.dtype).max)), spacing)
+
+    def _entropy(self, image: Image) -> NDArray[np.int32]:
+        return _NO_ENTROPY
+
+    def _growth(self, rasters: Rasters) -> Growth:
+        stop = 0.8 * rasters.spacing if self.extension_stop is None else self.extension_stop
+        return Growth(
+            step=self.extension / rasters.gsd,
+            least_step=max(stop / rasters.gsd, 1.0),
+            black_share=self.extension_black,
+            vegetation=self.vegetation_threshold,
+            entropy=self._entropy_limit(),
+        )
+
+    def _entropy_limit(self) -> float:
+        return 0.0
+
+    def _fitted_lines(self, rasters: Rasters) -> tuple[Segments, NDArray[np.int64]]:
+        """Return the lines around the black shapes, and their fates so far."""
+        gsd = rasters.gsd
+        black = rasters.masks.primary
+        curves = trace_shapes(black, shortest=self.minimum_side, gsd=gsd)
+        points, corners, offsets = find_corners(
+            curves,
+            sigma=self.smoothing * PAPER_PIXEL / SAMPLE,
+            product=self.corner_product,
+            straight=(self.corner_angle, 360.0 - self.corner_angle),
+        )
+        segments = fit_segments(curves, points, corners, offsets, shortest=self.minimum_side / gsd)
+        reach = max(1.0, self.inside_reach * PAPER_PIXEL / gsd)
+        lines = inside_first(segments.lines, black, reach=reach, outset=0.5)
+        fates = np.full(len(lines), Fate.RECTANGLE, dtype=np.int64)
+        fates[_beyond(lines, rasters.masks.coverage, reach)] = Fate.BORDER
+        return Segments(lines, segments.shapes), fates
+
+    def _rectangles(
+        self, rasters: Rasters, lines: Boxes, fates: NDArray[np.int64]
+    ) -> tuple[Boxes, NDArray[np.int64], Boxes]:
+        """Return initial rectangles of the lines still alive, the final one of each (-1: none), and the final ones.
+
+        The fates of lines that make no rectangle are written into `fates`.
+        """
+        gsd = rasters.gsd
+        alive = np.flatnonzero(fates == Fate.RECTANGLE)
+        initial, made = initial_rectangles(
+            rasters.cover,
+            self._growth(rasters),
+            lines[alive],
+            by_length(lines[alive]),
+            self.initial_width / gsd,
+            self.minimum_side / gsd,
+            rasters.spacing / gsd + 1.0 if self.inside_margin is None else self.inside_margin / gsd,
+        )
+        fates[alive[made < 0]] = np.where(made[made < 0] == INSIDE, Fate.INSIDE, Fate.NARROW)
+        rules = FinalRules(
+            reduction=self.reduction,
+            part_share=self.part_share,
+            total_share=self.total_share,
+            strip=max(self.strip / gsd, 2.0),
+            least_strip=1.0,
+            colour_share=self.colour_similarity,
+            black_share=self.black_share,
+            gap_share=self.gap_share,
+            rise=self.rise,
+            whole_initial=self.compare == "whole",
+        )
+        longest_first = np.argsort(-np.maximum(lengths(initial), initial[:, 7] - initial[:, 6]), kind="stable")
+        final, final_fates = final_rectangles(
+            rasters.colours, rasters.masks.primary, rasters.masks.secondary, rules, initial, longest_first
+        )
+        return initial, final_fates, final
+
+    def _extended(self, rasters: Rasters, lines: Boxes) -> Boxes:
+        extended: Boxes = extend_lines(rasters.cover, self._growth(rasters), lines, self.extension / rasters.gsd)
+        return extended
+
+
+def _beyond(lines: Boxes, coverage: NDArray[np.uint8], reach: float) -> NDArray[np.bool_]:
+    """Tell which lines have nothing measured on their outer side: the border of the points or of the image."""
+    rows, columns = coverage.shape
+    x = np.floor(lines[:, OX] + reach * lines[:, 3]).astype(np.intp)
+    y = np.floor(lines[:, OY] - reach * lines[:, 2]).astype(np.intp)
+    on = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+    covered = coverage[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)] > 0
+    return np.asarray(~(on & covered), dtype=np.bool_)

@@ -1,0 +1,192 @@
+"""Final rectangles: initial ones, shrunk and then extended over what has the colour of their roof.
+
+Nouns
+-----
+strip
+    What a step would add to a side: as long as the side, 0.35 m wide. It is sampled on a lattice in its own
+    coordinates, at least one row and one sample per pixel, because it may be thinner than a pixel.
+rise
+    More black in the primary mask than in the strip before: the side may be growing over a neighbour.
+
+A strip passes when more than 40 % of it is in range in each of Y, I and Q, more than 90 % is black in the secondary
+mask, and the primary black does not rise. A rise after the primary black fell below 10 % ends the side; any other
+failure halves the strip, down to the ground sampling distance.
+Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.4.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, to_box
+from .colours import Colours, dominant_ranges, yiq_bins
+
+__all__ = ["DROPPED", "FinalRules", "final_rectangles", "shrink"]
+
+#: Index of an initial rectangle that lay wholly inside a final one.
+DROPPED = -1
+
+
+class FinalRules(NamedTuple):
+    """Rules of the final extension; lengths in pixels, shares 0..1.
+
+    Attributes
+    ----------
+    reduction : float
+        Share by which length and width shrink first.
+    part_share, total_share : float
+        Of the dominant colours (see `colours`).
+    strip, least_strip : float
+        First width of a strip, and the width below which the side stands.
+    colour_share, black_share : float
+        Least shares in range (each of Y, I, Q) and black in the secondary mask.
+    gap_share : float
+        Primary black below which the next rise ends the side.
+    rise : float
+        Largest increase of primary black that does not count as a rise.
+    whole_initial : bool
+        Whether an initial rectangle is compared with final ones before it is shrunk.
+    """
+
+    reduction: float
+    part_share: float
+    total_share: float
+    strip: float
+    least_strip: float
+    colour_share: float
+    black_share: float
+    gap_share: float
+    rise: float
+    whole_initial: bool
+
+
+@njit(cache=True)
+def shrink(box: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    """Return a box with length and width less by `share`, about the same centre."""
+    out = box.copy()
+    along, across = share * (box[U1] - box[U0]) / 2, share * (box[V1] - box[V0]) / 2
+    out[U0] += along
+    out[U1] -= along
+    out[V0] += across
+    out[V1] -= across
+    return out
+
+
+@njit(cache=True)
+def lies_inside(inner: NDArray[np.float64], outer: NDArray[np.float64]) -> bool:
+    """Tell whether all corners of one box are in the other."""
+    slack = 1e-9
+    for along in (inner[U0], inner[U1]):
+        for across in (inner[V0], inner[V1]):
+            x = inner[OX] + along * inner[UX] - across * inner[UY]
+            y = inner[OY] + along * inner[UY] + across * inner[UX]
+            u, v = to_box(x, y, outer)
+            if u < outer[U0] - slack or u > outer[U1] + slack or v < outer[V0] - slack or v > outer[V1] + slack:
+                return False
+    return True
+
+
+@njit(cache=True)
+def strip_shares(
+    colours: Colours,
+    primary: NDArray[np.uint8],
+    secondary: NDArray[np.uint8],
+    within: NDArray[np.bool_],
+    strip: NDArray[np.float64],
+) -> tuple[float, float, float]:
+    """Return the least share in range over Y, I and Q, and the shares black in the primary and the secondary mask."""
+    rows, columns = primary.shape
+    across, down = max(1, round(strip[U1] - strip[U0])), max(1, round(strip[V1] - strip[V0]))
+    in_range = np.zeros(3, dtype=np.int64)
+    black, filled = 0, 0
+    for i in range(across):
+        u = strip[U0] + (i + 0.5) * (strip[U1] - strip[U0]) / across
+        for j in range(down):
+            v = strip[V0] + (j + 0.5) * (strip[V1] - strip[V0]) / down
+            column = math.floor(strip[OX] + u * strip[UX] - v * strip[UY])
+            row = math.floor(strip[OY] + u * strip[UY] + v * strip[UX])
+            if not (0 <= row < rows and 0 <= column < columns):
+                continue
+            black += primary[row, column]
+            filled += secondary[row, column]
+            y_bin, i_bin, q_bin = yiq_bins(colours, row, column)
+            in_range[0] += within[0, y_bin]
+            in_range[1] += within[1, i_bin]
+            in_range[2] += within[2, q_bin]
+    samples = across * down
+    return in_range.min() / samples, black / samples, filled / samples
+
+
+@njit(cache=True)
+def extend_final_side(
+    colours: Colours,
+    primary: NDArray[np.uint8],
+    secondary: NDArray[np.uint8],
+    within: NDArray[np.bool_],
+    rules: FinalRules,
+    box: NDArray[np.float64],
+    side: int,
+) -> None:
+    """Move one side of a box outwards, in place, as far as the strips pass."""
+    outwards = 1.0 if side in (U1, V1) else -1.0
+    opposite = U0 + U1 - side if side in (U0, U1) else V0 + V1 - side
+    width, before = rules.strip, 1.0
+    strip = box.copy()
+    while width >= rules.least_strip:
+        end = box[side] + outwards * width
+        strip[side], strip[opposite] = end, box[side]
+        in_range, black, filled = strip_shares(colours, primary, secondary, within, strip)
+        rises = black > before + rules.rise
+        if rises and before < rules.gap_share:
+            return
+        if in_range > rules.colour_share and filled > rules.black_share and not rises:
+            box[side], before = end, black
+        else:
+            width /= 2
+
+
+@njit(cache=True)
+def final_rectangles(
+    colours: Colours,
+    primary: NDArray[np.uint8],
+    secondary: NDArray[np.uint8],
+    rules: FinalRules,
+    initial: NDArray[np.float64],
+    order: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Extend the initial rectangles one after another.
+
+    Parameters
+    ----------
+    order : ndarray of int64, shape (n,)
+        Initial rectangles, the largest first.
+
+    Returns
+    -------
+    rectangles : ndarray, shape (m, 8)
+    fate : ndarray of int64, shape (n,)
+        Index of the final rectangle of each initial one, or `DROPPED`.
+    """
+    out, fate = np.empty((len(initial), 8)), np.full(len(initial), DROPPED)
+    found = 0
+    for i in order:
+        box = shrink(initial[i], rules.reduction)
+        compared = initial[i] if rules.whole_initial else box
+        inside = False
+        for j in range(found):
+            if lies_inside(compared, out[j]):
+                inside = True
+                break
+        if inside:
+            continue
+        within = dominant_ranges(colours, box, rules.part_share, rules.total_share)
+        for side in (V0, V1, U0, U1):
+            extend_final_side(colours, primary, secondary, within, rules, box, side)
+        out[found], fate[i] = box, found
+        found += 1
+    return out[:found].copy(), fate

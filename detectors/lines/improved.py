@@ -1,0 +1,204 @@
+"""The detector `improved`: the line detector with texture, which tells buildings from trees of their height and colour.
+
+Source: Awrangjeb, Zhang & Fraser, "Automatic building detection in complex scenes: improved detector using texture",
+IAPRS XXXVIII-3/W22 (2011). The page docs/line-detectors.md tells how each open point of the print is read and what that
+costs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scenes.parameters import parameter
+from ...scenes.raster import Image
+from .adjustment import adjust_to_neighbours, adjust_to_shape, rotate
+from .boxes import Boxes, lengths, prefix_sums
+from .contours import SAMPLE
+from .detector import PAPER_PIXEL, LineDetector, Rasters
+from .entropy import grey_levels, local_entropy
+from .extension import band, mean_in_boxes
+from .image_edges import ImageEdges, extract_edges
+from .segments import Segments
+from .texture import judge
+from .trace import Fate, Trace
+from .voting import cast_votes, longest_image_lines
+
+__all__ = ["Improved"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Improved(LineDetector):
+    """Line detector with texture of Awrangjeb, Zhang & Fraser (2011)."""
+
+    name: ClassVar[str] = "improved"
+
+    ground: str = parameter(
+        "point-dem", choices=("tile-dem", "tile-mode", "point-dem"),
+        doc="ground height: DEM under the point, mean DEM of the tile, or most frequent height of the tile's points",
+        source="2011, 3.1; 2010, 3.2; conference version, 3.1",
+    )  # fmt: skip
+    entropy_threshold: float = parameter(
+        0.75, minimum=0, maximum=1, swept=(0.3, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85),
+        doc="mean local entropy, as a share of the largest possible one, above which green is a tree; printed 0.3",
+        source="2011, 3.2; reading",
+    )  # fmt: skip
+    vegetation_side: str = parameter(
+        "either", choices=("either", "inside"),
+        doc="side of a line on which vegetation makes it a tree edge", source="2011, 3.2; 2010, 3.3.1",
+    )  # fmt: skip
+    adjustment: str = parameter(
+        "shape", choices=("shape", "neighbours", "none"),
+        doc="what lines are turned to: the longest line of their black shape, any line within 50 m, or nothing",
+        source="2011, 3.3",
+    )  # fmt: skip
+    adjustment_radius: float = parameter(
+        50.0, unit="m", minimum=0, doc="largest distance of a line and its reference when turned to neighbours",
+        source="2010, 3.3.2",
+    )  # fmt: skip
+    voting: bool = parameter(True, doc="whether lines are voted on; optional in the print", source="2011, 3.3")
+    vote_length: str = parameter(
+        "relative", choices=("relative", "printed"),
+        doc="vote v1 of a line shorter than the mean: L/mean, or the printed (mean-L)/mean",
+        source="2011, 3.3; reading",
+    )  # fmt: skip
+    majority: float = parameter(0.5, minimum=0, maximum=1, doc="mean vote that a line must exceed", source="2011, 3.3")
+    texture: bool = parameter(
+        True,
+        doc="whether candidates are tested by edge orientation histograms; optional in the print",
+        source="2011, 3.4",
+    )
+    edge_blur: float = parameter(
+        1.5,
+        unit="px",
+        minimum=0,
+        doc="sigma of the Gaussian before image edges are detected; reading",
+        source="2011, 3.4",
+    )
+    most_edges: float = parameter(
+        90.0, unit="m", minimum=0, doc="most length of edges in a building (tests 2 and 5)", source="2011, 3.4"
+    )
+    area_per_edge: float = parameter(
+        4.5, unit="m", minimum=0, doc="least area per length of edges (test 6); 45 px of 0.1 m", source="2011, 3.4"
+    )
+
+    def run(self, rasters: Rasters) -> Trace:
+        """Run all steps that follow the masks, keeping the intermediate results."""
+        gsd = rasters.gsd
+        segments, fates = self._fitted_lines(rasters)
+        green, leafy = self._tree_edges(rasters, segments.lines)
+        alive = fates == Fate.RECTANGLE
+        fates[alive & leafy] = Fate.VEGETATION
+        rescued = alive & green & ~leafy
+
+        rotation = self._rotation(segments, fates == Fate.RECTANGLE, gsd)
+        fates[(fates == Fate.RECTANGLE) & np.isnan(rotation)] = Fate.UNADJUSTED
+        lines = segments.lines.copy()
+        alive = fates == Fate.RECTANGLE
+        lines[alive] = self._extended(rasters, rotate(lines[alive], rotation[alive]))
+
+        edges = self._image_edges(rasters) if self.voting or self.texture else None
+        votes = judged = None
+        if self.voting:
+            assert edges is not None
+            votes = self._votes(lines, rotation, edges, segments.shapes, alive, gsd)
+            fates[alive & ~(np.nan_to_num(votes).mean(axis=1) > self.majority)] = Fate.OUTVOTED
+
+        initial, initial_fates, final = self._rectangles(rasters, lines, fates)
+        kept = np.ones(len(final), dtype=np.bool_)
+        if self.texture:
+            assert edges is not None
+            judged = judge(
+                final,
+                edges,
+                rasters.image.grid.shape,
+                gsd,
+                least=self.minimum_side,
+                most_edges=self.most_edges,
+                area_per_edge=self.area_per_edge,
+            )
+            kept = np.any(judged.passed, axis=1)
+        return Trace(
+            image=rasters.image,
+            masks=rasters.masks,
+            vegetation=rasters.cover.vegetation,
+            fitted=segments.lines,
+            lines=lines,
+            shapes=segments.shapes,
+            fates=fates,
+            rescued=rescued,
+            initial=initial,
+            initial_fates=initial_fates,
+            candidates=final,
+            kept=kept,
+            votes=votes,
+            texture=judged,
+        )
+
+    def _entropy(self, image: Image) -> NDArray[np.int32]:
+        prefix: NDArray[np.int32] = prefix_sums(local_entropy(grey_levels(image)))
+        return prefix
+
+    def _entropy_limit(self) -> float:
+        return 255.0 * self.entropy_threshold
+
+    def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which lines the vegetation index calls tree edges, and which of them the entropy does too."""
+        width = self.band_width / rasters.gsd
+        sides = [band(lines, width, 0.0)]
+        if self.vegetation_side == "either":
+            sides.append(band(lines, 0.0, width))
+        green, leafy = np.zeros(len(lines), dtype=np.bool_), np.zeros(len(lines), dtype=np.bool_)
+        for side in sides:
+            is_green = mean_in_boxes(rasters.cover.vegetation, side) > self.vegetation_threshold
+            green |= is_green
+            leafy |= is_green & (mean_in_boxes(rasters.cover.entropy, side) > self._entropy_limit())
+        return green, leafy
+
+    def _rotation(self, segments: Segments, alive: NDArray[np.bool_], gsd: float) -> NDArray[np.float64]:
+        rotation = np.full(len(segments), np.nan)
+        tolerance = np.radians(self.adjustment_angle)
+        if self.adjustment == "shape":
+            rotation[alive] = adjust_to_shape(segments.lines[alive], segments.shapes[alive], tolerance=tolerance)
+        elif self.adjustment == "neighbours":
+            rotation[alive] = adjust_to_neighbours(
+                segments.lines[alive], radius=self.adjustment_radius / gsd, tolerance=tolerance, longer_only=False
+            )
+        else:
+            rotation[alive] = 0.0
+        return rotation
+
+    def _image_edges(self, rasters: Rasters) -> ImageEdges:
+        return extract_edges(
+            grey_levels(rasters.image),
+            gsd=rasters.gsd,
+            blur=self.edge_blur,
+            shortest=self.minimum_side,
+            smoothing=self.smoothing * PAPER_PIXEL / SAMPLE,
+            product=self.corner_product,
+            straight=(self.corner_angle, 360.0 - self.corner_angle),
+        )
+
+    def _votes(
+        self,
+        lines: Boxes,
+        rotation: NDArray[np.float64],
+        edges: ImageEdges,
+        shapes: NDArray[np.int64],
+        alive: NDArray[np.bool_],
+        gsd: float,
+    ) -> NDArray[np.float64]:
+        image_lengths = longest_image_lines(lines, edges.lines, half_width=self.band_width / 2 / gsd)
+        return cast_votes(
+            lengths(lines) * gsd,
+            rotation,
+            image_lengths * gsd,
+            shapes,
+            alive,
+            tolerance=np.radians(self.adjustment_angle),
+            least=self.minimum_side,
+            length_as_printed=self.vote_length == "printed",
+        )

@@ -1,0 +1,86 @@
+"""Initial rectangles: where buildings are, grown from the longest lines first.
+
+A line is *already inside* a rectangle when its midpoint and at least half of its length are; it makes no rectangle of
+its own. Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, length_inside, to_box
+from .extension import Cover, Growth, extend_rectangle
+
+__all__ = ["INSIDE", "TOO_NARROW", "initial_rectangles"]
+
+#: What became of a line that made no rectangle (a rectangle's index is 0 or more).
+INSIDE = -1
+TOO_NARROW = -2
+
+
+@njit(cache=True)
+def share_inside(line: NDArray[np.float64], box: NDArray[np.float64], margin: float) -> float:
+    """Return the share of a line's length that lies in a box widened by `margin`; 0 when its midpoint does not."""
+    wide = box.copy()
+    wide[U0] -= margin
+    wide[U1] += margin
+    wide[V0] -= margin
+    wide[V1] += margin
+    middle = (line[U0] + line[U1]) / 2
+    u, v = to_box(line[OX] + middle * line[UX], line[OY] + middle * line[UY], wide)
+    if not (wide[U0] <= u <= wide[U1] and wide[V0] <= v <= wide[V1]):
+        return 0.0
+    return float(length_inside(line, wide) / (line[U1] - line[U0]))
+
+
+@njit(cache=True)
+def initial_rectangles(
+    cover: Cover,
+    rules: Growth,
+    lines: NDArray[np.float64],
+    order: NDArray[np.int64],
+    depth: float,
+    least_side: float,
+    margin: float,
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Grow a rectangle from each line that is not yet inside one.
+
+    Parameters
+    ----------
+    order : ndarray of int64, shape (n,)
+        Lines from the longest to the shortest.
+    depth : float
+        Width of the rectangle before it is extended, pixels.
+    least_side : float
+        A rectangle with a shorter side is dropped, pixels.
+    margin : float
+        How far outside a rectangle a line still counts as inside, pixels: an extension ends up to a step short.
+
+    Returns
+    -------
+    rectangles : ndarray, shape (m, 8)
+    fate : ndarray of int64, shape (n,)
+        Index of the rectangle that each line made, `INSIDE` or `TOO_NARROW`.
+    """
+    n = len(lines)
+    rectangles, fate = np.empty((n, 8)), np.full(n, INSIDE)
+    found = 0
+    for i in order:
+        inside = False
+        for j in range(found):
+            if share_inside(lines[i], rectangles[j], margin) >= 0.5:
+                inside = True
+                break
+        if inside:
+            continue
+        box = lines[i].copy()
+        box[V0], box[V1] = 0.0, depth
+        extend_rectangle(cover, rules, box)
+        if min(box[U1] - box[U0], box[V1] - box[V0]) < least_side:
+            fate[i] = TOO_NARROW
+        else:
+            rectangles[found], fate[i] = box, found
+            found += 1
+    return rectangles[:found].copy(), fate

@@ -1,0 +1,154 @@
+"""Segments: the straight pieces of curves between corners, as fitted lines.
+
+A *segment* is all curve points between two corners (of an open curve also between a corner and an end); its *line* is
+the total least-squares line through them, cut at the projections of the first and last point. Lines are boxes without
+width (see `boxes`), directed so that black lies across: the paper's inside point P_in is three pixels to that side.
+Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, Boxes, lengths
+from .contours import Curves
+
+__all__ = ["Segments", "fit_line", "fit_segments", "inside_first"]
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Fitted lines.
+
+    Attributes
+    ----------
+    lines : ndarray, shape (n, 8)
+        Boxes without width; the origin is the middle of the line.
+    shapes : ndarray of int64, shape (n,)
+        Black shape (or image edge) that each lies along.
+    """
+
+    lines: Boxes
+    shapes: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def take(self, index: NDArray[np.bool_] | NDArray[np.intp]) -> Segments:
+        """Return the segments at `index`."""
+        return Segments(self.lines[index], self.shapes[index])
+
+
+@njit(cache=True)
+def fit_line(points: NDArray[np.float64], first: int, count: int, start: int, n: int) -> NDArray[np.float64]:
+    """Fit a line to `count` points of the closed or open curve ``points[start:start + n]``, from index `first` on."""
+    mx = my = 0.0
+    for k in range(count):
+        at = start + (first + k) % n
+        mx += points[at, 0]
+        my += points[at, 1]
+    mx /= count
+    my /= count
+    xx = xy = yy = 0.0
+    for k in range(count):
+        at = start + (first + k) % n
+        dx, dy = points[at, 0] - mx, points[at, 1] - my
+        xx += dx * dx
+        xy += dx * dy
+        yy += dy * dy
+    angle = 0.5 * math.atan2(2 * xy, xx - yy)
+    ux, uy = math.cos(angle), math.sin(angle)
+    a, b = start + first % n, start + (first + count - 1) % n
+    t0 = (points[a, 0] - mx) * ux + (points[a, 1] - my) * uy
+    t1 = (points[b, 0] - mx) * ux + (points[b, 1] - my) * uy
+    if t1 < t0:
+        ux, uy, t0, t1 = -ux, -uy, -t0, -t1
+    middle, half = (t0 + t1) / 2, (t1 - t0) / 2
+    line = np.zeros(8)
+    line[OX], line[OY], line[UX], line[UY] = mx + middle * ux, my + middle * uy, ux, uy
+    line[U0], line[U1] = -half, half
+    return line
+
+
+@njit(cache=True)
+def _fit_all(
+    points: NDArray[np.float64],
+    offsets: NDArray[np.int64],
+    closed: bool,
+    corners: NDArray[np.int64],
+    corner_offsets: NDArray[np.int64],
+    shortest: float,
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    most = len(corners) + len(offsets)
+    lines, owner = np.empty((most, 8)), np.empty(most, dtype=np.int64)
+    found = 0
+    for i in range(len(offsets) - 1):
+        start, n = offsets[i], offsets[i + 1] - offsets[i]
+        ends = corners[corner_offsets[i] : corner_offsets[i + 1]]
+        pieces = len(ends) + 1
+        if closed:
+            pieces = len(ends) if len(ends) >= 2 else 0
+        for j in range(pieces):
+            if closed:
+                first, last = ends[j], ends[(j + 1) % len(ends)]
+                count = (last - first) % n + 1
+            else:
+                first = ends[j - 1] if j > 0 else 0
+                last = ends[j] if j < len(ends) else n - 1
+                count = last - first + 1
+            if count < 2:
+                continue
+            line = fit_line(points, first, count, start, n)
+            if line[U1] - line[U0] >= shortest:
+                lines[found], owner[found] = line, i
+                found += 1
+    return lines[:found].copy(), owner[:found].copy()
+
+
+def fit_segments(
+    curves: Curves,
+    points: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    corner_offsets: NDArray[np.int64],
+    *,
+    shortest: float,
+) -> Segments:
+    """Fit a line to each piece between corners; lines shorter than `shortest` pixels are left out.
+
+    A closed curve with fewer than two corners has no straight piece.
+    """
+    lines, owner = _fit_all(points, curves.offsets, curves.closed, corners, corner_offsets, shortest)
+    return Segments(lines, curves.shapes[owner])
+
+
+def inside_first(lines: Boxes, black: NDArray[np.uint8], *, reach: float, outset: float) -> Boxes:
+    """Turn lines whose black side is the other one, and move each `outset` pixels away from the black.
+
+    The black side is where the point `reach` pixels from the middle is black; where both points are alike, the
+    direction of travel along the contour stands. Contour points are centres of black pixels, so the edge of the mask is
+    half a pixel further out.
+    """
+    rows, columns = black.shape
+
+    def is_black(distance: float) -> NDArray[np.bool_]:
+        x = np.floor(lines[:, OX] - distance * lines[:, UY]).astype(np.intp)
+        y = np.floor(lines[:, OY] + distance * lines[:, UX]).astype(np.intp)
+        on = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+        values = black[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)]
+        return np.asarray(on & (values > 0), dtype=np.bool_)
+
+    turned = lines.copy()
+    wrong = ~is_black(reach) & is_black(-reach)
+    turned[wrong, UX] *= -1
+    turned[wrong, UY] *= -1
+    turned[:, OX] += outset * turned[:, UY]
+    turned[:, OY] -= outset * turned[:, UX]
+    half = lengths(turned) / 2
+    turned[:, U0], turned[:, U1] = -half, half
+    turned[:, V0] = turned[:, V1] = 0.0
+    return turned

@@ -1,0 +1,112 @@
+"""The trace of one detection: every intermediate result, to count, to draw and to test.
+
+The *fate* of a line says why it made no rectangle of its own, or that it did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scenes.raster import Grid, Image
+from .boxes import Boxes
+from .masks import Masks
+from .texture import Texture
+
+__all__ = ["Fate", "Trace"]
+
+
+class Fate(IntEnum):
+    """What became of a line; `label` is its name for people."""
+
+    RECTANGLE = 0, "made a rectangle"
+    BORDER = 1, "on the border of the points or the image"
+    VEGETATION = 2, "vegetation beside it"
+    UNADJUSTED = 3, "neither parallel nor perpendicular to a reference"
+    OUTVOTED = 4, "outvoted"
+    INSIDE = 5, "inside another line's rectangle"
+    NARROW = 6, "rectangle with a side under the minimum"
+
+    label: str
+
+    def __new__(cls, value: int, label: str) -> Fate:
+        """Make a member with its label."""
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.label = label
+        return member
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Intermediate results of a line detector, pixel coordinates.
+
+    Attributes
+    ----------
+    image : Image
+    masks : Masks
+    vegetation : ndarray of int32, shape (rows, columns + 1)
+        Row prefix sums of the vegetation index.
+    fitted, lines : ndarray, shape (n, 8)
+        Lines as fitted, and adjusted and extended (as far as they came).
+    shapes, fates : ndarray of int64, shape (n,)
+        Black shape of each line, and its `Fate`.
+    rescued : ndarray of bool, shape (n,)
+        Lines that the vegetation index alone would have dropped and the entropy kept.
+    initial : ndarray, shape (m, 8)
+        Initial rectangles.
+    initial_fates : ndarray of int64, shape (m,)
+        Index of each one's candidate, or -1 when it lay inside one.
+    candidates : ndarray, shape (k, 8)
+        Extended rectangles.
+    kept : ndarray of bool, shape (k,)
+        Which candidates are buildings.
+    votes : ndarray, shape (n, 4), optional
+        Votes v1 to v4 of each line, NaN without a vote.
+    texture : Texture, optional
+        Edge orientation histograms and tests of the candidates.
+    """
+
+    image: Image
+    masks: Masks
+    vegetation: NDArray[np.int32]
+    fitted: Boxes
+    lines: Boxes
+    shapes: NDArray[np.int64]
+    fates: NDArray[np.int64]
+    rescued: NDArray[np.bool_]
+    initial: Boxes
+    initial_fates: NDArray[np.int64]
+    candidates: Boxes
+    kept: NDArray[np.bool_]
+    votes: NDArray[np.float64] | None = None
+    texture: Texture | None = None
+
+    @property
+    def grid(self) -> Grid:
+        """Grid of the orthoimage."""
+        return self.image.grid
+
+    @property
+    def final(self) -> Boxes:
+        """The rectangles that are buildings."""
+        return np.asarray(self.candidates[self.kept])
+
+    def counts(self) -> dict[str, Any]:
+        """Return how many lines and rectangles each step left, for the metadata of the footprints."""
+        counted: dict[str, Any] = {"lines": len(self.fates)}
+        counted |= {f"lines {fate.label}": int((self.fates == fate).sum()) for fate in Fate}
+        counted["lines kept by entropy"] = int(self.rescued.sum())
+        counted["initial rectangles"] = len(self.initial)
+        counted["initial rectangles inside a final one"] = int((self.initial_fates < 0).sum())
+        counted["final rectangles"] = int(self.kept.sum())
+        if self.texture is not None:
+            counted["candidates without texture of a building"] = int((~self.kept).sum())
+            passed = self.texture.passed
+            alone = passed & (passed.sum(axis=1) == 1)[:, None]
+            counted |= {f"candidates kept by test {k + 1} alone": int(alone[:, k].sum()) for k in range(6)}
+        return counted
