@@ -65,6 +65,13 @@ class Detector(Parameterised, ABC):
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Return the footprints of the buildings in a scene; none is a valid result."""
 
+    def fingerprint(self) -> str:
+        """Return a digest of what it reads besides the scene (a program, footprints made elsewhere); empty for none.
+
+        It is part of the key of stored runs: when it changes, they are computed anew.
+        """
+        return ""
+
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
         """Yield the intermediate results of the same detection, for ``roofbench detect --steps``."""
         raise UnsupportedError(f"the detector {self.name!r} shows no intermediate steps")

@@ -1,0 +1,254 @@
+"""Isolation: a process of its own for every worker, so that a run that crashes, hangs or eats memory fails alone.
+
+An *isolated process* is a fresh Python that does one task after the other, told by length-prefixed messages over its
+standard streams. Numeric libraries in it use one thread each, because the cores belong to the workers. The caller
+watches time and memory; when a limit is passed or the process dies, the task fails with that reason and the next task
+gets a new process. When the caller dies, even by ``kill -9``, the stream ends and the process leaves.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import selectors
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import IO
+
+from .tasks import Cost, Outcome
+
+__all__ = ["THREAD_LIMITS", "IsolatedProcess", "Limits", "call_isolated"]
+
+#: One thread per numeric library and process.
+THREAD_LIMITS = {
+    name: "1"
+    for name in (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+    )
+}
+_PACKAGE = __package__
+_START = f"from {_PACKAGE}.isolation import serve; serve()"
+_ALLOCATION_SLACK = 1 << 30  # bytes that libraries may reserve without using them
+_WATCH_EVERY = 0.1  # seconds between looks at a worker's memory
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one run may take.
+
+    Attributes
+    ----------
+    seconds : float, optional
+        Wall clock, reading of the scene and evaluation included.
+    memory : int, optional
+        Resident memory of the worker process, bytes.
+    """
+
+    seconds: float | None = None
+    memory: int | None = None
+
+
+class IsolatedProcess:
+    """One worker process; `call` starts it when there is none."""
+
+    def __init__(self, *, python_path: str | None = None) -> None:
+        self._python_path = python_path
+        self._process: subprocess.Popen[bytes] | None = None
+        self._errors: IO[bytes] | None = None
+
+    def call(self, task: str, limits: Limits) -> bytes:
+        """Do a task and return its outcome as bytes; death and passed limits are failed outcomes."""
+        process = self._running()
+        errors = self._errors
+        assert errors is not None
+        errors.seek(0)
+        errors.truncate()
+        if limits.memory is not None:
+            _stop_runaway_allocation(process.pid, limits.memory)
+        started = time.monotonic()
+        peak = 0
+        try:
+            _send(process.stdin, task.encode())
+            deadline = None if limits.seconds is None else started + limits.seconds
+            receiver = _Receiver(process.stdout)
+            while (message := receiver.poll(_WATCH_EVERY)) is None:
+                used = _resident(process.pid) if limits.memory is not None else 0
+                peak = max(peak, used)
+                if deadline is not None and time.monotonic() > deadline:
+                    return self._failed(f"time limit of {limits.seconds:g} s passed", started, peak)
+                if limits.memory is not None and used > limits.memory:
+                    return self._failed(f"memory limit of {limits.memory / 1e6:.0f} MB passed", started, peak)
+            return message
+        except (EOFError, OSError):
+            return self._failed(None, started, peak)
+
+    def close(self) -> None:
+        """End the process."""
+        process, self._process = self._process, None
+        if process is not None:
+            with suppress(OSError):
+                process.kill()
+            process.wait()
+            for stream in (process.stdin, process.stdout, self._errors):
+                if stream is not None:
+                    with suppress(OSError):
+                        stream.close()
+
+    def _failed(self, reason: str | None, started: float, peak: int) -> bytes:
+        process, errors = self._process, self._errors
+        assert process is not None
+        assert errors is not None
+        if reason is None:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(timeout=5)
+            reason = _death(process.returncode)
+        errors.seek(0)
+        told = errors.read()[-4000:].decode(errors="replace")
+        self.close()
+        cost = Cost(seconds=time.monotonic() - started, peak_memory=peak)
+        return Outcome(status="failed", reason=reason, traceback=told, cost=cost).to_bytes()
+
+    def _running(self) -> subprocess.Popen[bytes]:
+        if self._process is not None and self._process.poll() is not None:
+            self.close()
+        if self._process is None:
+            path = self._python_path
+            if path is None:
+                path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+            environment = {**os.environ, **THREAD_LIMITS, "PYTHONPATH": path}
+            self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
+            self._process = subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
+                [sys.executable, "-X", "faulthandler", "-c", _START],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                env=environment,
+                start_new_session=True,  # Ctrl-C goes to the caller, who ends its workers in order
+            )
+        return self._process
+
+
+def _death(code: int | None) -> str:
+    if code is None:
+        return "the worker process stopped answering"
+    if code < 0:
+        with suppress(ValueError):
+            return f"the worker process was killed by signal {-code} ({signal.Signals(-code).name})"
+        return f"the worker process was killed by signal {-code}"
+    return f"the worker process left the interpreter with exit code {code}"
+
+
+_local = threading.local()
+_every: list[IsolatedProcess] = []
+
+
+def call_isolated(task: str, limits: Limits) -> bytes:
+    """Do a task in the isolated process of the calling thread; what is submitted to executors of every kind."""
+    process: IsolatedProcess | None = getattr(_local, "process", None)
+    if process is None:
+        process = _local.process = IsolatedProcess()
+        _every.append(process)
+    return process.call(task, limits)
+
+
+def close_isolated() -> None:
+    """End the isolated processes of all threads of this process."""
+    while _every:
+        _every.pop().close()
+
+
+def serve() -> None:
+    """Do tasks from standard input until it ends: the main function of an isolated process."""
+    inward, outward = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a detector prints must not disturb the messages
+    tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+
+    def listen() -> None:
+        while True:
+            try:
+                tasks.put(_receive(inward))
+            except (EOFError, OSError):
+                os._exit(0)  # the caller has gone; a detection in flight is of no use
+
+    threading.Thread(target=listen, daemon=True).start()
+    from .worker import execute_text
+
+    while True:
+        _send(outward, execute_text(tasks.get().decode()))
+
+
+def _send(stream: IO[bytes] | None, message: bytes) -> None:
+    assert stream is not None
+    stream.write(struct.pack("<Q", len(message)))
+    stream.write(message)
+    stream.flush()
+
+
+def _receive(stream: IO[bytes]) -> bytes:
+    (size,) = struct.unpack("<Q", _exactly(stream, 8))
+    return _exactly(stream, size)
+
+
+def _exactly(stream: IO[bytes], size: int) -> bytes:
+    data = stream.read(size)
+    if len(data) < size:
+        raise EOFError
+    return data
+
+
+class _Receiver:
+    """One message that arrives in pieces."""
+
+    def __init__(self, stream: IO[bytes] | None) -> None:
+        assert stream is not None
+        self._descriptor = stream.fileno()
+        self._data = bytearray()
+        self._size: int | None = None
+
+    def poll(self, seconds: float) -> bytes | None:
+        """Wait at most so long; return the message when it is whole."""
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._descriptor, selectors.EVENT_READ)
+            if not selector.select(seconds):
+                return None
+        piece = os.read(self._descriptor, 1 << 20)
+        if not piece:
+            raise EOFError
+        self._data += piece
+        if self._size is None and len(self._data) >= 8:
+            (self._size,) = struct.unpack("<Q", self._data[:8])
+            del self._data[:8]
+        if self._size is not None and len(self._data) >= self._size:
+            return bytes(self._data)
+        return None
+
+
+def _stop_runaway_allocation(process: int, memory: int) -> None:
+    """Let one huge allocation fail at once, before a look at the memory could notice it (Linux only)."""
+    import psutil
+
+    if hasattr(psutil, "RLIMIT_DATA"):
+        bound = memory + _ALLOCATION_SLACK
+        with suppress(psutil.Error, OSError):
+            psutil.Process(process).rlimit(psutil.RLIMIT_DATA, (bound, psutil.RLIM_INFINITY))
+
+
+def _resident(process: int) -> int:
+    """Return the resident memory of a process, bytes."""
+    import psutil
+
+    with suppress(psutil.Error):
+        return int(psutil.Process(process).memory_info().rss)
+    return 0

@@ -1,0 +1,234 @@
+"""Plans: which runs a suite means, which of them are stored already, and why the others have to be done."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ..detectors.base import Detector
+from ..evaluators.base import Evaluator
+from ..scenes.errors import UnsupportedError
+from ..scenes.scene import Scene
+from .keys import source_closure
+from .recipes import PluginRecipe, SceneRecipe, code_digest, label_of
+from .records import RunIdentity, evaluation_key
+from .store import Store
+from .suite import Entrant, Suite
+
+__all__ = ["Judge", "Overwrite", "Plan", "PlannedRun", "make_plan", "plan_content", "suite_from_content"]
+
+#: ``missing``: what has no good result is run, failures again; ``never``: what is not stored at all; ``always``: all.
+Overwrite = Literal["missing", "never", "always"]
+
+
+@dataclass(frozen=True)
+class Judge:
+    """An evaluator with the key of its evaluations in the store."""
+
+    evaluator: Evaluator
+    recipe: PluginRecipe
+    key: str
+
+    @classmethod
+    def of(cls, evaluator: Evaluator) -> Judge:
+        """Return the judge of an evaluator."""
+        recipe = _recipe(evaluator)
+        return cls(evaluator, recipe, evaluation_key(recipe, code_digest(evaluator)))
+
+    @property
+    def label(self) -> str:
+        """Name with changed parameters."""
+        return label_of(self.evaluator)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedRun:
+    """One run of a plan.
+
+    Attributes
+    ----------
+    identity : RunIdentity
+    entrant : Entrant
+    scene : SceneRecipe or Scene
+    todo : {"detect", "evaluate", "nothing"}
+        ``evaluate``: detections are stored, an evaluation is not.
+    why : str
+        Reason in words.
+    stored : int, optional
+        Run id where a run of that key is stored.
+    lacking : tuple of Judge
+        Evaluators whose evaluation is not stored.
+    """
+
+    identity: RunIdentity
+    entrant: Entrant
+    scene: SceneRecipe | Scene
+    todo: Literal["detect", "evaluate", "nothing"]
+    why: str
+    stored: int | None = None
+    lacking: tuple[Judge, ...] = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The runs of a suite, ordered by scene, and the evaluators."""
+
+    suite: Suite
+    runs: tuple[PlannedRun, ...]
+    judges: tuple[Judge, ...]
+
+    @property
+    def keys(self) -> list[str]:
+        """Run keys in order."""
+        return [run.identity.key for run in self.runs]
+
+    def counts(self) -> Mapping[str, int]:
+        """Return how many runs are to be detected, evaluated, or left alone."""
+        return Counter(run.todo for run in self.runs)
+
+
+def _recipe(plugin: Detector | Evaluator) -> PluginRecipe:
+    """Return the recipe, or for classes that only this process has, a name that tells them apart."""
+    try:
+        return PluginRecipe.of(plugin)
+    except UnsupportedError:
+        return PluginRecipe(f"(this process):{type(plugin).__qualname__}", plugin.values())
+
+
+def scene_recipe(scene: SceneRecipe | Scene) -> SceneRecipe:
+    """Return the recipe of either."""
+    return SceneRecipe.of_scene(scene) if isinstance(scene, Scene) else scene
+
+
+def make_plan(suite: Suite, store: Store, *, overwrite: Overwrite = "missing", only_failed: bool = False) -> Plan:
+    """Compare a suite with the store.
+
+    Parameters
+    ----------
+    suite : Suite
+    store : Store
+    overwrite : {"missing", "never", "always"}
+    only_failed : bool
+        Try failures again and leave everything else alone.
+    """
+    judges = tuple(Judge.of(evaluator) for evaluator in suite.evaluators)
+    identities: list[tuple[RunIdentity, Entrant, SceneRecipe | Scene]] = []
+    parts = [
+        (entrant, _recipe(entrant.detector), source_closure(type(entrant.detector)), entrant.detector.fingerprint())
+        for entrant in suite.entrants
+    ]
+    for scene in suite.scenes:
+        recipe = scene_recipe(scene)
+        key = recipe.key
+        for entrant, detector, code, fingerprint in parts:
+            for seed in entrant.seeds:
+                identity = RunIdentity(
+                    detector=detector,
+                    label=entrant.label,
+                    fingerprint=fingerprint,
+                    code=code,
+                    scene=recipe,
+                    scene_key=key,
+                    seed=seed,
+                )
+                identities.append((identity, entrant, scene))
+    unique = {identity.key: (identity, entrant, scene) for identity, entrant, scene in identities}
+    stored = store.statuses(unique)
+    good = [run_id for run_id, status, _ in stored.values() if status == "ok"]
+    evaluated = {judge.key: store.evaluated(good, judge.key) for judge in judges}
+    runs = []
+    for key, (identity, entrant, scene) in unique.items():
+        run_id, status, reason = stored.get(key, (None, None, ""))
+        lacking: tuple[Judge, ...] = ()
+        todo: Literal["detect", "evaluate", "nothing"] = "nothing"
+        if status is None:
+            todo, why = "detect", _why_new(store, identity)
+        elif overwrite == "always":
+            todo, why = "detect", "to be replaced"
+        elif status == "failed":
+            retried = overwrite == "missing"
+            todo = "detect" if retried else "nothing"
+            why = f"failed before: {reason}" + ("" if retried else " (not tried again)")
+        elif status == "skipped":
+            why = f"skipped: {reason}"
+        else:
+            why = f"stored as run {run_id}"
+            lacking = tuple(judge for judge in judges if run_id not in evaluated[judge.key])
+            if lacking:
+                todo = "evaluate"
+                why += ", not yet judged by " + ", ".join(judge.label for judge in lacking)
+        if only_failed and status != "failed":
+            todo = "nothing"
+        runs.append(
+            PlannedRun(
+                identity=identity, entrant=entrant, scene=scene, todo=todo, why=why, stored=run_id, lacking=lacking
+            )
+        )
+    return Plan(suite, tuple(runs), judges)
+
+
+def _why_new(store: Store, identity: RunIdentity) -> str:
+    """Say what differs from the latest stored run of the same detector, scene and seed, when there is one."""
+    latest = store.latest_like(identity.label, identity.scene.name, identity.seed)
+    return (
+        "not run yet"
+        if latest is None
+        else "; ".join(differences(store, latest, identity)) + " since run " + str(latest)
+    )
+
+
+def differences(store: Store, run_id: int, identity: RunIdentity) -> list[str]:
+    """Return in words which parts of a stored run's key differ from those of `identity`; empty when none does."""
+    row, code = store.run(run_id), store.code(run_id)
+    found = []
+    now = dict(identity.detector.parameters)
+    for name in sorted({*row.parameters, *now}):
+        before, after = row.parameters.get(name, "absent"), now.get(name, "absent")
+        if before != after:
+            found.append(f"parameter {name} is {after}, was {before}")
+    for kind, before, after in (
+        ("source", code.modules, identity.code.modules),
+        ("package", code.packages, identity.code.packages),
+    ):
+        for name in sorted({*before, *after}):
+            if before.get(name) != after.get(name):
+                change = "changed" if name in before and name in after else "new" if name in after else "gone"
+                told = (
+                    f" ({before.get(name)} to {after.get(name)})" if kind == "package" and change == "changed" else ""
+                )
+                found.append(f"{kind} {name} {change}{told}")
+    if row.fingerprint != identity.fingerprint:
+        found.append("the program or file that it reads changed")
+    if row.scene_key != identity.scene_key:
+        found.append("the scene changed")
+    if row.seed != identity.seed:
+        found.append(f"seed is {identity.seed}, was {row.seed}")
+    return found
+
+
+def plan_content(suite: Suite) -> dict[str, Any]:
+    """Return a suite as JSON holds it, to be resumed from the store."""
+    return {
+        "name": suite.name,
+        "scenes": [scene_recipe(scene).to_dict() for scene in suite.scenes],
+        "detectors": [
+            {**_recipe(entrant.detector).to_dict(), "seeds": list(entrant.seeds)} for entrant in suite.entrants
+        ],
+        "evaluators": [_recipe(evaluator).to_dict() for evaluator in suite.evaluators],
+    }
+
+
+def suite_from_content(content: Mapping[str, Any]) -> Suite:
+    """Return the suite that `plan_content` wrote down."""
+    entrants: Sequence[Entrant] = [
+        Entrant(PluginRecipe(item["use"], item["parameters"]).detector(), tuple(item["seeds"]))
+        for item in content["detectors"]
+    ]
+    return Suite(
+        content["name"],
+        tuple(SceneRecipe.from_dict(recipe) for recipe in content["scenes"]),
+        tuple(entrants),
+        tuple(PluginRecipe(**recipe).evaluator() for recipe in content["evaluators"]),
+    )

@@ -1,0 +1,109 @@
+"""Records of the results store: what identifies a run, and rows as they are read.
+
+A *run key* stands for everything that decides the detections, an *evaluation key* for an evaluator with its parameters
+and code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import shapely
+
+from ..scenes.footprints import Footprints
+from ..scenes.raster import Grid
+from .keys import SourceClosure, digest
+from .recipes import PluginRecipe, SceneRecipe
+from .tasks import Status
+
+__all__ = ["RunIdentity", "RunRow", "StoredScene", "evaluation_key"]
+
+
+def evaluation_key(recipe: PluginRecipe, code: str) -> str:
+    """Return the key of an evaluator with its parameters and code."""
+    return digest([recipe.use, dict(recipe.parameters), code])
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunIdentity:
+    """The parts of a run's key.
+
+    Attributes
+    ----------
+    detector : PluginRecipe
+    label : str
+        Name with changed parameters, for tables; no part of the key.
+    fingerprint : str
+        Of what the detector reads besides the scene.
+    code : SourceClosure
+    scene : SceneRecipe
+    scene_key : str
+    seed : int
+    """
+
+    detector: PluginRecipe
+    label: str
+    fingerprint: str
+    code: SourceClosure
+    scene: SceneRecipe
+    scene_key: str
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """SHA-256 of the parts."""
+        return digest(
+            {
+                "detector": self.detector.use.rpartition("/")[2],
+                "parameters": dict(self.detector.parameters),
+                "fingerprint": self.fingerprint,
+                "code": self.code.digest,
+                "scene": self.scene_key,
+                "seed": self.seed,
+            }
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRow:
+    """One stored run, without its detections."""
+
+    id: int
+    key: str
+    detector: str
+    label: str
+    parameters: Mapping[str, Any]
+    fingerprint: str
+    seed: int
+    scene: str
+    scene_id: int
+    scene_key: str
+    scene_group: str
+    version: str
+    status: Status
+    reason: str
+    traceback: str
+    finished: str
+    seconds: float
+    cpu_seconds: float
+    peak_memory: int
+    detected: int | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredScene:
+    """A scene as the store knows it; `reference` is None until it was opened once, or when it has none."""
+
+    id: int
+    key: str
+    name: str
+    recipe: SceneRecipe
+    content_hash: str | None
+    crs: str | None
+    extent: tuple[float, float, float, float] | None
+    grid: Grid | None
+    area: shapely.Geometry | None
+    reference: Footprints | None
+    facts: Mapping[str, Any]

@@ -1,0 +1,317 @@
+"""Suites: what is run, as a TOML file, as words on the command line, or as Python objects.
+
+Nouns
+-----
+suite
+    Named scenes, detectors and evaluators; every detector runs on every scene.
+scene entry
+    A folder (``path``), or a preset of the generator with ``seeds`` and parameters, of which a list is a sweep axis.
+entrant
+    A detector with parameters and the seeds of its random streams.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import itertools
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ..detectors.base import Detector
+from ..detectors.registry import DETECTORS, make_detector
+from ..evaluators.base import Evaluator
+from ..evaluators.registry import make_evaluator
+from ..scenes.errors import InputError, ParameterError, RoofbenchError, UnknownNameError
+from ..scenes.names import nearest_hint, parse_selection
+from ..scenes.scene import Scene
+from .recipes import SceneRecipe, label_of, preset_names
+
+__all__ = ["Entrant", "Suite", "named_suite", "read_suite", "scenes_of", "suite_names"]
+
+_TABLES = ("scenes", "detectors", "evaluators")
+_DEFAULT_EVALUATOR = "threshold-free"
+_MAX_AXIS = 10_000
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A detector and the seeds it runs with on every scene."""
+
+    detector: Detector
+    seeds: tuple[int, ...] = (0,)
+
+    def __post_init__(self) -> None:
+        if not self.detector.stochastic and self.seeds != (0,):
+            object.__setattr__(self, "seeds", (0,))  # other seeds would repeat the same footprints
+
+    @property
+    def label(self) -> str:
+        """Name with changed parameters."""
+        return label_of(self.detector)
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is run.
+
+    Attributes
+    ----------
+    name : str
+    scenes : tuple of SceneRecipe or Scene
+        Scene objects stay in this process or are spooled for workers.
+    entrants : tuple of Entrant
+    evaluators : tuple of Evaluator
+    """
+
+    name: str
+    scenes: tuple[SceneRecipe | Scene, ...]
+    entrants: tuple[Entrant, ...]
+    evaluators: tuple[Evaluator, ...]
+
+    def with_scenes(self, pattern: str) -> Suite:
+        """Return the suite with only the scenes whose name matches a pattern such as ``knox*``."""
+        kept = tuple(scene for scene in self.scenes if fnmatch.fnmatchcase(scene.name, pattern))
+        if not kept:
+            names = [scene.name for scene in self.scenes]
+            raise UnknownNameError(
+                f"no scene of {self.name!r} matches {pattern!r}{nearest_hint(pattern, names)}; it has {_some(names)}"
+            )
+        return replace(self, scenes=kept)
+
+    def with_seeds(self, count: int) -> Suite:
+        """Return the suite with seeds 1 to `count` of every preset instead of those it names."""
+        scenes: dict[str, SceneRecipe | Scene] = {}
+        for scene in self.scenes:
+            if isinstance(scene, Scene) or scene.kind not in ("preset", "builtin"):
+                scenes[scene.name] = scene
+                continue
+            for seed in range(1, count + 1):
+                recipe = SceneRecipe.of_preset(scene.place, seed=seed, parameters=scene.parameters)
+                scenes[recipe.name] = recipe
+        return replace(self, scenes=tuple(scenes.values()))
+
+
+def suite_names() -> list[str]:
+    """Return the names of the suites that come with roofbench."""
+    folder = resources.files(__package__) / "suites"
+    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def named_suite(name: str) -> Suite:
+    """Return a suite that comes with roofbench."""
+    if name not in suite_names():
+        raise UnknownNameError(
+            f"no suite called {name!r}{nearest_hint(name, suite_names())}; there are {', '.join(suite_names())}"
+        )
+    text = (resources.files(__package__) / "suites" / f"{name}.toml").read_text("utf-8")
+    return _parse(text, source=f"suite {name}", folder=Path(), default_name=name)
+
+
+def read_suite(path: str | Path) -> Suite:
+    """Read a suite from a TOML file; scene paths and plugin files are relative to it.
+
+    Raises
+    ------
+    InputError
+        Missing file, TOML syntax, unknown keys or values; the line is named.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text("utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such suite file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file} cannot be read as a suite: {error}") from error
+    return _parse(text, source=str(file), folder=file.resolve().parent, default_name=file.stem)
+
+
+def scenes_of(words: Iterable[str]) -> tuple[SceneRecipe, ...]:
+    """Return the scenes that words on the command line name: folders, presets, ``preset[seed=3,tree_density=40]``."""
+    recipes: dict[str, SceneRecipe] = {}
+    for word in words:
+        path = Path(word)
+        if path.is_dir():
+            recipe = SceneRecipe.of_folder(path)
+        else:
+            name, values = parse_selection(word)
+            if name not in preset_names():
+                raise UnknownNameError(
+                    f"{word!r} is no scene folder and no preset{nearest_hint(name, preset_names())}; "
+                    f"the presets are {', '.join(preset_names())}"
+                )
+            parameters = {key: _number(value) for key, value in values.items()}
+            seed = parameters.pop("seed", 0)
+            if not isinstance(seed, int):
+                raise ParameterError(f"{word}: seed must be a whole number, not {seed!r}")
+            recipe = SceneRecipe.of_preset(name, seed=seed, parameters=parameters)
+        recipes[recipe.name] = recipe
+    return tuple(recipes.values())
+
+
+def all_entrants() -> tuple[Entrant, ...]:
+    """Return every registered detector that needs no parameter of its own to run, with default parameters."""
+    entrants = []
+    for name in DETECTORS.names():
+        try:
+            entrants.append(Entrant(make_detector(name)))
+        except (ParameterError, ModuleNotFoundError):
+            continue  # one that wraps a program or a file, or is not installed in full, is run when it is asked for
+    return tuple(entrants)
+
+
+def _number(text: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text.lower(), text)
+
+
+def _some(names: Sequence[str], most: int = 8) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+class _Places:
+    """Where the tables and keys of a TOML text stand, for messages."""
+
+    def __init__(self, text: str, source: str) -> None:
+        self._lines = text.splitlines()
+        self._source = source
+
+    def error(self, message: str, table: str | None = None, number: int = 0, key: str | None = None) -> InputError:
+        """Return the error with file, line and table named."""
+        line = self._line(table, number, key)
+        place = f"{self._source}, line {line}" if line else self._source
+        where = f" in [[{table}]] number {number + 1}" if table else ""
+        return InputError(f"{place}: {message}{where}")
+
+    def _line(self, table: str | None, number: int, key: str | None) -> int | None:
+        at = None
+        if table is None:
+            start, end = 0, len(self._lines)
+        else:
+            heads = [i for i, line in enumerate(self._lines) if line.replace(" ", "").startswith(f"[[{table}]]")]
+            if number >= len(heads):
+                return None
+            start, at = heads[number] + 1, heads[number] + 1
+            later = [i for i in range(start, len(self._lines)) if self._lines[i].lstrip().startswith("[")]
+            end = later[0] if later else len(self._lines)
+        for i in range(start, end):
+            if key is not None and self._lines[i].partition("=")[0].strip().strip('"') == key:
+                return i + 1
+        return at
+
+
+def _parse(text: str, *, source: str, folder: Path, default_name: str) -> Suite:
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source}: no valid TOML: {error}") from error
+    places = _Places(text, source)
+    known = ("name", *_TABLES)
+    for key in content:
+        if key not in known:
+            raise places.error(
+                f"unknown key {key!r}{nearest_hint(key, known)}; a suite has {', '.join(known)}", key=key
+            )
+    name = content.get("name", default_name)
+    if not isinstance(name, str) or not name:
+        raise places.error(f"name must be a text, not {name!r}", key="name")
+    for table in _TABLES:
+        if not isinstance(content.get(table, []), list) or not all(isinstance(t, dict) for t in content.get(table, [])):
+            raise places.error(f"write {table} as tables with the heading [[{table}]]", key=table)
+    scenes: dict[str, SceneRecipe] = {}
+    for number, entry in enumerate(content.get("scenes", [])):
+        for recipe in _scene_entry(entry, folder, places, number):
+            scenes[recipe.name] = recipe
+    if not scenes:
+        raise places.error("a suite needs at least one [[scenes]]")
+    entrants = [_entrant(entry, folder, places, n) for n, entry in enumerate(content.get("detectors", []))]
+    evaluators = [_evaluator(entry, folder, places, n) for n, entry in enumerate(content.get("evaluators", []))]
+    return Suite(
+        name,
+        tuple(scenes.values()),
+        tuple(entrants) or all_entrants(),
+        tuple(evaluators) or (make_evaluator(_DEFAULT_EVALUATOR),),
+    )
+
+
+def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> Iterator[SceneRecipe]:
+    if ("path" in entry) == ("preset" in entry):
+        raise places.error("give a path or a preset, one of them,", "scenes", number)
+    if "path" in entry:
+        for key in entry:
+            if key != "path":
+                raise places.error(f"{key!r} is nothing that a scene with a path takes", "scenes", number, key)
+        try:
+            yield SceneRecipe.of_folder(folder / str(entry["path"]))
+        except RoofbenchError as error:
+            raise places.error(str(error), "scenes", number, "path") from error
+        return
+    preset = entry["preset"]
+    if preset not in preset_names():
+        hint = nearest_hint(str(preset), preset_names())
+        raise places.error(
+            f"no preset {preset!r}{hint}; there are {', '.join(preset_names())}", "scenes", number, "preset"
+        )
+    seeds = _seeds(entry.get("seeds", [0]), first=1, places=places, table="scenes", number=number)
+    names = [key for key in entry if key not in ("preset", "seeds")]
+    axes = [value if isinstance(value := entry[key], list) else [value] for key in names]
+    for key, axis in zip(names, axes, strict=True):
+        if not axis or not all(isinstance(value, bool | int | float | str) for value in axis):
+            raise places.error(f"{key!r} must be a value or a list of values", "scenes", number, key)
+    for values in itertools.product(*axes):
+        for seed in seeds:
+            yield SceneRecipe.of_preset(preset, seed=seed, parameters=dict(zip(names, values, strict=True)))
+
+
+def _entrant(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> Entrant:
+    use, values = _use(entry, folder, places, "detectors", number)
+    seeds = values.pop("seeds", [0])
+    try:
+        detector = make_detector(use, values)
+    except RoofbenchError as error:
+        raise places.error(str(error), "detectors", number, _named_key(error, values) or "use") from error
+    return Entrant(detector, _seeds(seeds, first=0, places=places, table="detectors", number=number))
+
+
+def _evaluator(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> Evaluator:
+    use, values = _use(entry, folder, places, "evaluators", number)
+    try:
+        return make_evaluator(use, values)
+    except RoofbenchError as error:
+        raise places.error(str(error), "evaluators", number, _named_key(error, values) or "use") from error
+
+
+def _use(
+    entry: Mapping[str, Any], folder: Path, places: _Places, table: str, number: int
+) -> tuple[str, dict[str, Any]]:
+    values = dict(entry)
+    use = values.pop("use", None)
+    if not isinstance(use, str):
+        raise places.error(f"use must name a {table.removesuffix('s')}", table, number, "use")
+    if ".py" in use and not Path(use).is_absolute():
+        use = str(folder / use)
+    return use, values
+
+
+def _named_key(error: RoofbenchError, values: Mapping[str, Any]) -> str | None:
+    return next((key for key in values if f"{key} " in str(error) or f"{key!r}" in str(error)), None)
+
+
+def _seeds(value: Any, *, first: int, places: _Places, table: str, number: int) -> tuple[int, ...]:
+    """Read ``5`` (so many, from `first`) or ``[1, 2, 3]``."""
+    if isinstance(value, int) and not isinstance(value, bool) and 0 < value <= _MAX_AXIS:
+        return tuple(range(first, first + value))
+    if (
+        isinstance(value, list)
+        and value
+        and all(isinstance(seed, int) and not isinstance(seed, bool) and seed >= 0 for seed in value)
+    ):
+        return tuple(dict.fromkeys(value))
+    raise places.error(f"seeds must be a number of seeds or a list of them, not {value!r}", table, number, "seeds")

@@ -1,0 +1,190 @@
+"""The worker: does one task in whichever process it is called, and reports failures instead of raising them."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import os
+import platform
+import time
+import traceback
+from collections import OrderedDict
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..detectors.base import Detector
+from ..detectors.checks import checked_output
+from ..evaluators.base import Evaluator
+from ..scenes.errors import RoofbenchError
+from ..scenes.footprints import Footprints
+from ..scenes.scene import Scene
+from .keys import random_stream_entropy
+from .recipes import PluginRecipe, SceneRecipe, code_digest
+from .tasks import Cost, Outcome, SceneRecord, Score, Task, _plain
+
+__all__ = ["detect", "execute", "execute_text", "machine_facts"]
+
+#: Scenes that were opened last; neighbouring tasks of a plan are about one scene.
+_scenes: OrderedDict[str, Scene] = OrderedDict()
+_KEPT_SCENES = 2
+
+
+def detect(scene: Scene, detector: Detector, *, seed: int = 0) -> Footprints:
+    """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector."""
+    visible = scene.for_detection()
+    visible.require(detector.requires)
+    rng = np.random.default_rng(np.random.SeedSequence(random_stream_entropy(seed, scene.name, detector.name)))
+    return checked_output(detector.detect(visible, rng), scene, detector.name)
+
+
+def execute_text(task: str) -> bytes:
+    """Do a task given as text; the form in which tasks travel between processes."""
+    return execute(Task.from_json(task)).to_bytes()
+
+
+def execute(task: Task, *, scene: Scene | None = None, detector: Detector | None = None) -> Outcome:
+    """Do a task. A failure or a skip is an outcome, too.
+
+    Parameters
+    ----------
+    task : Task
+    scene, detector : optional
+        The objects themselves, where task and caller share a process.
+    """
+    started = time.perf_counter(), time.process_time()
+    try:
+        scene = scene if scene is not None else _opened(task.scene)
+        detector = detector if detector is not None else task.detector.detector()
+        evaluators = [recipe.evaluator() for recipe in task.evaluators]
+        record = describe(scene) if task.describe_scene else None
+        visible = scene.for_detection()
+        lacking = visible.lacks(detector.requires)
+        if lacking:
+            return Outcome(status="skipped", reason=lacking, scene=record, machine=machine_facts())
+        _read(visible)
+        gc.collect()
+        _reset_peak_memory()
+        started = time.perf_counter(), time.process_time()
+        detected = detect(scene, detector, seed=task.seed)
+        cost = _cost_since(started)
+        scores = score(detected, scene, list(zip(task.evaluators, evaluators, strict=True)))
+    except MemoryError:
+        reason = "out of memory"
+        return Outcome(
+            status="failed",
+            reason=reason,
+            traceback=traceback.format_exc(),
+            cost=_cost_since(started),
+            machine=machine_facts(),
+        )
+    except Exception as error:
+        told = str(error) if isinstance(error, RoofbenchError) else f"{type(error).__name__}: {error}"
+        return Outcome(
+            status="failed",
+            reason=" ".join(told.split())[:500],
+            traceback=traceback.format_exc(),
+            cost=_cost_since(started),
+            machine=machine_facts(),
+        )
+    return Outcome(
+        status="ok",
+        cost=cost,
+        detections=tuple(shapely.to_wkb(detected.polygons).tolist()),
+        attributes={name: [_plain(value) for value in column] for name, column in detected.attributes.items()},
+        metadata={**detected.metadata, **({"repairs": [str(r) for r in detected.repairs]} if detected.repairs else {})},
+        scores=tuple(scores),
+        scene=record,
+        machine=machine_facts(),
+    )
+
+
+def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecipe, Evaluator]]) -> list[Score]:
+    """Return what each evaluator says; nothing for a scene without reference."""
+    if scene.reference is None:
+        return []
+    scores = []
+    for recipe, evaluator in evaluators:
+        evaluation = evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.evaluation_grid)
+        scores.append(Score.of(evaluation, recipe, code_digest(evaluator)))
+    return scores
+
+
+def describe(scene: Scene) -> SceneRecord:
+    """Return what the store keeps of a scene."""
+    reference, grid = scene.reference, scene.evaluation_grid
+    labels = None if reference is None or reference.building_ids is None else reference.building_ids
+    return SceneRecord(
+        content_hash=scene.content_hash,
+        crs=scene.crs,
+        extent=scene.extent,
+        grid=None if grid is None else dataclasses.astuple(grid),
+        area=None if scene.area is None else shapely.to_wkb(scene.area),
+        reference=None if reference is None else tuple(shapely.to_wkb(reference.polygons).tolist()),
+        reference_ids=() if reference is None else tuple(reference.ids.tolist()),
+        building_ids=None if labels is None else tuple(_plain(label) for label in labels),
+        facts={name: value for name, value in scene.facts.items() if _is_json(value)},
+    )
+
+
+def _is_json(value: Any) -> bool:
+    if isinstance(value, dict):
+        return all(isinstance(name, str) and _is_json(item) for name, item in value.items())
+    if isinstance(value, list | tuple):
+        return all(_is_json(item) for item in value)
+    return value is None or isinstance(value, bool | int | float | str)
+
+
+def _opened(recipe: SceneRecipe) -> Scene:
+    key = repr(recipe)
+    if key not in _scenes:
+        while len(_scenes) >= _KEPT_SCENES:
+            _scenes.popitem(last=False)
+        _scenes[key] = recipe.open()
+    _scenes.move_to_end(key)
+    return _scenes[key]
+
+
+def _read(scene: Scene) -> None:
+    """Read what the detector may ask for before the clock starts: its time is that of detection in memory."""
+    _ = scene.points, scene.image, scene.dem
+
+
+def _cost_since(started: tuple[float, float]) -> Cost:
+    return Cost(
+        seconds=time.perf_counter() - started[0],
+        cpu_seconds=time.process_time() - started[1],
+        peak_memory=_peak_memory(),
+    )
+
+
+def _reset_peak_memory() -> None:
+    """Let the kernel count the highest resident memory anew (Linux only)."""
+    with suppress(OSError), open("/proc/self/clear_refs", "w") as control:
+        control.write("5")
+
+
+def _peak_memory() -> int:
+    with suppress(OSError, ValueError, StopIteration), open("/proc/self/status") as status:
+        line = next(line for line in status if line.startswith("VmHWM"))
+        return int(line.split()[1]) * 1024
+    return 0
+
+
+def machine_facts() -> dict[str, Any]:
+    """Return where the work is done: host, processor, cores, system, Python."""
+    return {
+        "host": platform.node(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+    }
+
+
+def _processor() -> str:
+    with suppress(OSError, StopIteration), open("/proc/cpuinfo") as facts:
+        return next(line for line in facts if line.startswith("model name")).partition(":")[2].strip()
+    return platform.processor()
