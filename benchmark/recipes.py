@@ -131,6 +131,14 @@ class SceneRecipe:
         return cls("memory", scene.name, "", content_hash=scene.content_hash)
 
     @property
+    def word(self) -> str:
+        """How the scene is named on the command line: its folder, or ``preset[seed=3,tree_density=40]``."""
+        if self.kind in ("preset", "builtin"):
+            values = {"seed": self.seed, **self.parameters}
+            return f"{self.place}[{','.join(f'{name}={value}' for name, value in values.items())}]"
+        return self.place if self.kind == "folder" else self.name
+
+    @property
     def group(self) -> str:
         """What the scene is one of: the preset with its parameters but without its seed, else its own name."""
         return self.name.replace(f"-{self.seed}", "", 1) if self.kind in ("preset", "builtin") else self.name

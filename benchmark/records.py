@@ -6,6 +6,7 @@ and code.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -74,10 +75,11 @@ class RunRow:
     key: str
     detector: str
     label: str
-    parameters: Mapping[str, Any]
+    parameters_text: str
     fingerprint: str
     seed: int
     scene: str
+    recipe_text: str
     scene_id: int
     scene_key: str
     scene_group: str
@@ -90,6 +92,17 @@ class RunRow:
     cpu_seconds: float
     peak_memory: int
     detected: int | None
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Every parameter of the detector, defaults included."""
+        values: Mapping[str, Any] = json.loads(self.parameters_text)
+        return values
+
+    @property
+    def recipe(self) -> SceneRecipe:
+        """How its scene is opened again."""
+        return SceneRecipe.from_dict(json.loads(self.recipe_text))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,8 @@ from .tasks import Status, footprints_of
 
 __all__ = ["StoreReader"]
 
-_RUN_COLUMNS = """runs.id, runs.key, detector, label, parameters, fingerprint, seed, scenes.name AS scene, scene_id,
+_RUN_COLUMNS = """runs.id, runs.key, detector, label, parameters AS parameters_text, fingerprint, seed, scenes.name AS scene,
+    recipe AS recipe_text, scene_id,
     scenes.key AS scene_key, scene_group, version, status, reason, traceback, finished, seconds, cpu_seconds,
     peak_memory, detected"""
 
@@ -158,6 +159,11 @@ class StoreReader:
             facts=json.loads(row["facts"] or "{}"),
         )
 
+    def reference_counts(self) -> dict[int, int | None]:
+        """Return the number of reference footprints of every scene that was opened; None where it has no reference."""
+        rows = self._db.execute("SELECT id, reference_count FROM scenes WHERE content_hash IS NOT NULL")
+        return {int(row[0]): row[1] for row in rows}
+
     def detections(self, run_id: int) -> Footprints:
         """Return the raw detections of a run."""
         row = self._db.execute(
@@ -236,9 +242,7 @@ class StoreReader:
 
 
 def _run_row(row: sqlite3.Row) -> RunRow:
-    values = dict(row)
-    values["parameters"] = json.loads(values["parameters"])
-    return RunRow(**values)
+    return RunRow(**dict(row))
 
 
 def _chunks(items: list[str], size: int = 500) -> Iterator[list[str]]:

@@ -9,6 +9,7 @@ import platform
 import time
 import traceback
 from collections import OrderedDict
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -45,20 +46,27 @@ def execute_text(task: str) -> bytes:
     return execute(Task.from_json(task)).to_bytes()
 
 
-def execute(task: Task, *, scene: Scene | None = None, detector: Detector | None = None) -> Outcome:
+def execute(
+    task: Task,
+    *,
+    scene: Scene | None = None,
+    detector: Detector | None = None,
+    evaluators: Sequence[Evaluator] | None = None,
+) -> Outcome:
     """Do a task. A failure or a skip is an outcome, too.
 
     Parameters
     ----------
     task : Task
-    scene, detector : optional
+    scene, detector, evaluators : optional
         The objects themselves, where task and caller share a process.
     """
     started = time.perf_counter(), time.process_time()
     try:
         scene = scene if scene is not None else _opened(task.scene)
         detector = detector if detector is not None else task.detector.detector()
-        evaluators = [recipe.evaluator() for recipe in task.evaluators]
+        if evaluators is None:
+            evaluators = [recipe.evaluator() for recipe in task.evaluators]
         record = describe(scene) if task.describe_scene else None
         visible = scene.for_detection()
         lacking = visible.lacks(detector.requires)

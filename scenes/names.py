@@ -112,14 +112,21 @@ class Registry:
             if not hasattr(module, attribute):
                 raise UnknownNameError(f"{path} has no class {attribute!r}{nearest_hint(attribute, vars(module))}")
             return self.add(getattr(module, attribute))
-        found = [
+        found = self._defined_in(module)
+        if len(found) != 1:
+            raise UnknownNameError(f"{path} holds {len(found)} {self.kind} classes, not one: name it as {path}:Class")
+        return self.add(found[0])
+
+    def add_all(self, path: Path) -> list[type[Any]]:
+        """Load a Python file and add every class of this kind that it defines; there may be none."""
+        return [self.add(plugin) for plugin in self._defined_in(_load_file(path, self.kind))]
+
+    def _defined_in(self, module: ModuleType) -> list[type[Any]]:
+        return [
             value
             for value in vars(module).values()
             if isinstance(value, type) and issubclass(value, self._base) and value.__module__ == module.__name__
         ]
-        if len(found) != 1:
-            raise UnknownNameError(f"{path} holds {len(found)} {self.kind} classes, not one: name it as {path}:Class")
-        return self.add(found[0])
 
     def _entry_points(self) -> dict[str, importlib.metadata.EntryPoint]:
         return {entry.name: entry for entry in importlib.metadata.entry_points(group=self._group)}

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from ...scenes.errors import RoofbenchError
-from . import evaluate, scenes
+from . import evaluate, run, scenes
 
 __all__ = ["app", "main"]
 
@@ -27,6 +27,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.command("evaluate")(evaluate.evaluate)
+app.command("run")(run.run)
 app.add_typer(scenes.app)
 
 

@@ -1,0 +1,133 @@
+"""Options that several commands share, and how they are read."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...scenes.errors import ParameterError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..isolation import Limits
+    from ..suite import Suite
+
+__all__ = [
+    "DEFAULT_STORE",
+    "DetectorOption",
+    "EvaluatorOption",
+    "JobsOption",
+    "MemoryLimitOption",
+    "PluginOption",
+    "QuietOption",
+    "SchedulerOption",
+    "StoreOption",
+    "TimeLimitOption",
+    "load_plugins",
+    "messages",
+    "read_limits",
+    "suite_from_words",
+]
+
+DEFAULT_STORE = Path("roofbench.sqlite")
+
+StoreOption = Annotated[Path, typer.Option("--store", help="Results store, one SQLite file.", metavar="FILE")]
+DetectorOption = Annotated[
+    list[str] | None,
+    typer.Option("--detector", "-d", help="NAME, 'NAME[parameter=value,...]' or FILE.py:CLASS; repeat for more."),
+]
+EvaluatorOption = Annotated[
+    list[str] | None,
+    typer.Option("--evaluator", "-e", help="NAME or 'NAME[parameter=value,...]'; repeat for more."),
+]
+PluginOption = Annotated[
+    list[Path] | None,
+    typer.Option("--plugin", help="Python file with detectors or evaluators of your own; repeat for more."),
+]
+JobsOption = Annotated[
+    int, typer.Option("--jobs", "-j", min=0, help="Worker processes; 0: in this process, without limits.")
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option("--scheduler", help="Dask scheduler, for instance tcp://host:8786.", metavar="URL")
+]
+TimeLimitOption = Annotated[
+    float | None, typer.Option("--time-limit", min=0.001, help="Wall clock seconds that one run may take.")
+]
+MemoryLimitOption = Annotated[
+    str | None, typer.Option("--memory-limit", help="Memory that one run may take: 500M, 8G.", metavar="SIZE")
+]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages.")]
+
+_SIZE = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*([kKmMgG]?)(?:i?[bB])?\s*$")
+
+
+def read_limits(seconds: float | None, memory: str | None) -> Limits:
+    """Return the limits of a run."""
+    from ..isolation import Limits
+
+    if memory is None:
+        return Limits(seconds, None)
+    match = _SIZE.match(memory)
+    if match is None:
+        raise ParameterError(f"--memory-limit must be a size such as 500M or 8G, not {memory!r}")
+    return Limits(seconds, int(float(match[1]) * {"": 1, "k": 1e3, "m": 1e6, "g": 1e9}[match[2].lower()]))
+
+
+def messages(quiet: bool = False) -> Console:
+    """Return the console for messages and progress: standard error, plain when it is no terminal."""
+    from rich.console import Console
+
+    return Console(stderr=True, quiet=quiet, highlight=False)
+
+
+def load_plugins(files: list[Path] | None) -> None:
+    """Register every detector and evaluator in the files."""
+    from ...detectors.registry import DETECTORS
+    from ...evaluators.registry import EVALUATORS
+
+    for file in files or ():
+        found = [*DETECTORS.add_all(file), *EVALUATORS.add_all(file)]
+        if not found:
+            raise ParameterError(f"{file} holds neither a detector nor an evaluator: derive from roofbench.Detector")
+
+
+def suite_from_words(
+    words: list[str] | None, detectors: list[str] | None, evaluators: list[str] | None, *, seeds: int = 1
+) -> Suite:
+    """Return the suite that positional words and options mean.
+
+    Parameters
+    ----------
+    words : list of str
+        One suite (a TOML file or the name of one that comes with roofbench), or scene folders and presets; the suite
+        ``quick`` when empty.
+    detectors, evaluators : list of str
+        Selections that replace those of the suite.
+    seeds : int
+        Seeds of stochastic detectors that are selected here.
+    """
+    from dataclasses import replace
+
+    from ...detectors.registry import make_detector
+    from ...evaluators.registry import make_evaluator
+    from ..suite import Entrant, Suite, all_entrants, named_suite, read_suite, scenes_of, suite_names
+
+    words = words or ["quick"]
+    if len(words) == 1 and words[0].endswith(".toml"):
+        suite = read_suite(words[0])
+    elif len(words) == 1 and words[0] in suite_names():
+        suite = named_suite(words[0])
+    else:
+        suite = Suite("scenes", scenes_of(words), (), (make_evaluator("threshold-free"),))
+        if not detectors:
+            suite = replace(suite, entrants=all_entrants())
+    if detectors:
+        numbers = tuple(range(seeds))
+        suite = replace(suite, entrants=tuple(Entrant(make_detector(name), numbers) for name in detectors))
+    if evaluators:
+        suite = replace(suite, evaluators=tuple(make_evaluator(name) for name in evaluators))
+    return suite

@@ -1,0 +1,177 @@
+"""``roofbench run``: scenes x detectors, leaderboard on the terminal and in files."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from ...scenes.errors import ParameterError
+from .options import (
+    DEFAULT_STORE,
+    DetectorOption,
+    EvaluatorOption,
+    JobsOption,
+    MemoryLimitOption,
+    PluginOption,
+    QuietOption,
+    SchedulerOption,
+    StoreOption,
+    TimeLimitOption,
+    load_plugins,
+    messages,
+    read_limits,
+    suite_from_words,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ...reports.tables import Leaderboard
+    from ..plan import Plan, PlannedRun
+    from ..tasks import Outcome
+
+
+def run(
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[SUITE | SCENE...]",
+            help="A suite (TOML file or name), or scene folders and presets; 'quick' by default.",
+        ),
+    ] = None,
+    detector: DetectorOption = None,
+    evaluator: EvaluatorOption = None,
+    scenes: Annotated[str | None, typer.Option(help="Only scenes whose name matches.", metavar="PATTERN")] = None,
+    seeds: Annotated[int | None, typer.Option(min=1, help="Seeds 1 to N of every preset.", metavar="N")] = None,
+    detector_seeds: Annotated[
+        int, typer.Option(min=1, help="Seeds of stochastic detectors given by -d.", metavar="N")
+    ] = 1,
+    jobs: JobsOption = 1,
+    scheduler: SchedulerOption = None,
+    time_limit: TimeLimitOption = None,
+    memory_limit: MemoryLimitOption = None,
+    store: StoreOption = DEFAULT_STORE,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder for leaderboard.csv and leaderboard.md.")
+    ] = None,
+    rank_by: Annotated[str | None, typer.Option(help="Index that ranks, for instance pixel.quality.")] = None,
+    plugin: PluginOption = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List what would run and why the rest would not.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what this store was last asked for.")] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run only what failed before.")] = False,
+    overwrite: Annotated[
+        Literal["missing", "never", "always"],
+        typer.Option(help="missing: all without a good result; never: not even failures again; always: everything."),
+    ] = "missing",
+    quiet: QuietOption = False,
+) -> None:
+    """Run detectors on scenes and print the leaderboard; what the store holds already is not run again.
+
+    Exit code 3 when runs failed, 4 when nothing could be measured.
+    """
+    from rich.console import Console
+
+    from ...reports.tables import print_incidents
+    from ..leaderboard import incidents_of, make_leaderboard
+    from ..plan import make_plan, plan_content, suite_from_content
+    from ..runner import Execution, run_plan
+    from ..store import Store
+
+    load_plugins(plugin)
+    limits = read_limits(time_limit, memory_limit)
+    if jobs == 0 and limits != read_limits(None, None):
+        raise ParameterError("limits need a worker process: use --jobs 1 or more")
+    if resume and words:
+        raise ParameterError("--resume goes on with what the store was asked for: leave out the suite and scenes")
+    told = messages(quiet)
+    with Store(store, must_exist=resume) as opened:
+        suite = suite_from_content(opened.last_plan()) if resume else suite_from_words(
+            words, detector, evaluator, seeds=detector_seeds
+        )
+        if seeds is not None:
+            suite = suite.with_seeds(seeds)
+        if scenes is not None:
+            suite = suite.with_scenes(scenes)
+        plan = make_plan(suite, opened, overwrite=overwrite, only_failed=retry_failed)
+        if dry_run:
+            _print_plan(plan)
+            return
+        opened.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
+        with _progress(plan, told) as report:
+            result = run_plan(
+                plan,
+                opened,
+                execution=Execution(jobs=jobs, scheduler=scheduler, limits=limits),
+                overwrite=overwrite,
+                progress=report,
+            )
+        boards = [
+            make_leaderboard(result.rows, opened, judge, title=f"Suite {suite.name}", rank_by=rank_by)
+            for judge in plan.judges
+        ]
+        known = len(result.rows) - result.done
+        told.print(f"{result.done} runs done, {known} stored before, {len(result.failed)} failed; store {store}")
+        for number, board in enumerate(boards):
+            if number:
+                typer.echo()
+            board.print(Console(highlight=False, width=None if sys.stdout.isatty() else 160))
+        print_incidents(incidents_of(result.rows), told)
+        if output is not None:
+            _write(output, boards)
+        if result.failed:
+            raise typer.Exit(3)
+        if not any(entry.scenes for board in boards for entry in board.entries):
+            raise typer.Exit(4)
+
+
+def _print_plan(plan: Plan) -> None:
+    words = {"detect": "run", "evaluate": "evaluate", "nothing": "stored"}
+    for run in plan.runs:
+        identity = run.identity
+        typer.echo(f"{words[run.todo]:9}{identity.label}  {identity.scene.name}  seed {identity.seed}: {run.why}")
+    counts = plan.counts()
+    typer.echo(
+        f"{len(plan.runs)} runs: {counts['detect']} to run, {counts['evaluate']} to evaluate, "
+        f"{counts['nothing']} left as stored"
+    )
+
+
+@contextmanager
+def _progress(plan: Plan, console: Console) -> Iterator[Callable[[PlannedRun, Outcome], None]]:
+    """Yield what is told of each finished run: a bar on a terminal, otherwise a line for failures only."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    total = plan.counts()["detect"]
+    if not console.is_terminal or console.quiet or not total:
+        yield lambda run, outcome: None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task("running", total=total)
+
+        def report(run: PlannedRun, outcome: Outcome) -> None:
+            progress.update(bar, advance=1, description=f"{run.identity.label} on {run.identity.scene.name}"[:50])
+            if outcome.status == "failed":
+                progress.console.print(
+                    f"failed {run.identity.label} on {run.identity.scene.name}: {outcome.reason}", markup=False
+                )
+
+        yield report
+
+
+def _write(folder: Path, boards: list[Leaderboard]) -> None:
+    """Write one CSV and one Markdown file; a further evaluator gets files of its own name."""
+    from ...scenes.output import whole_file
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, board in enumerate(boards):
+        name = "leaderboard" if number == 0 else f"leaderboard-{board.evaluator.partition(' ')[0]}"
+        for ending, text in (("csv", board.to_csv()), ("md", board.to_markdown())):
+            with whole_file(folder / f"{name}.{ending}", overwrite=True) as scratch:
+                scratch.write_text(text, encoding="utf-8")
