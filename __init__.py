@@ -14,6 +14,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .benchmark.session import detect, run
     from .detectors.base import Detector, Step
     from .detectors.registry import make_detector
     from .evaluators.base import Evaluation, Evaluator, Index
@@ -42,6 +43,7 @@ _HOMES = {
     "RoofbenchError": "scenes.errors",
     "Scene": "scenes.scene",
     "Step": "detectors.base",
+    "detect": "benchmark.session",
     "evaluate": "evaluators.comparison",
     "make_detector": "detectors.registry",
     "make_evaluator": "evaluators.registry",
@@ -49,6 +51,7 @@ _HOMES = {
     "parameter": "scenes.parameters",
     "pool": "evaluators.comparison",
     "read_footprints": "scenes.vector_files",
+    "run": "benchmark.session",
     "save_scene": "scenes.folder",
     "write_footprints": "scenes.vector_files",
 }
@@ -66,6 +69,7 @@ __all__ = [
     "RoofbenchError",
     "Scene",
     "Step",
+    "detect",
     "evaluate",
     "make_detector",
     "make_evaluator",
@@ -73,6 +77,7 @@ __all__ = [
     "parameter",
     "pool",
     "read_footprints",
+    "run",
     "save_scene",
     "write_footprints",
 ]

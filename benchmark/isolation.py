@@ -28,15 +28,12 @@ __all__ = ["THREAD_LIMITS", "IsolatedProcess", "Limits", "call_isolated"]
 
 #: One thread per numeric library and process.
 THREAD_LIMITS = {
-    name: "1"
-    for name in (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-    )
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
+    "NUMEXPR_NUM_THREADS": "1",
+    "VECLIB_MAXIMUM_THREADS": "1",
 }
 _PACKAGE = __package__
 _START = f"from {_PACKAGE}.isolation import serve; serve()"

@@ -131,7 +131,7 @@ def _resolve(target: str, home: str, folder: Path) -> tuple[str, Path] | None:
     public API say nothing about behaviour and are left out with the root.
     """
     top = target.partition(".")[0]
-    if top in (_ROOT, home) and not home.startswith("roofbench_plugin_") or top == _ROOT:
+    if (top in (_ROOT, home) and not home.startswith("roofbench_plugin_")) or top == _ROOT:
         for name in (target, target.rpartition(".")[0]):
             file = _module_file(name) if name and name != _ROOT else None
             if file is not None:

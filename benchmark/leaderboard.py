@@ -157,7 +157,8 @@ def _index(evaluator: Evaluator, key: str | None) -> Index:
     known = {index.key: index for index in evaluator.indices}
     if key not in known:
         raise UnknownNameError(
-            f"the evaluator {evaluator.name!r} has no index {key!r}{nearest_hint(key, known)}; it has {', '.join(known)}"
+            f"the evaluator {evaluator.name!r} has no index {key!r}{nearest_hint(key, known)}; "
+            f"it has {', '.join(known)}"
         )
     return known[key]
 
@@ -198,4 +199,3 @@ def repeat_command(row: RunRow) -> str:
     detector = row.detector + bracket + changed
     words = ["roofbench", "detect", detector, row.recipe.word, "--seed", str(row.seed), "-o", "out.gpkg"]
     return shlex.join(words)
-

@@ -145,8 +145,10 @@ class SceneRecipe:
 
     @property
     def key(self) -> str:
-        """Key of the scene, known without generating it: its name (from which random streams follow) with the content
-        of its files, or with the generator's code, seed and parameters.
+        """Key of the scene, known without generating it.
+
+        Its name (from which random streams follow) with the content of its files, or with the generator's code, seed
+        and parameters.
         """
         if self.kind in ("preset", "builtin"):
             module = _GENERATOR if self.kind == "preset" else _BUILTIN
@@ -198,6 +200,11 @@ def make_preset(preset: str, seed: int, parameters: Mapping[str, Any]) -> Scene:
     """Return a synthetic scene of a preset."""
     scene: Scene = importlib.import_module(f"{_ROOT}.{_GENERATOR}").make_scene(preset, seed=seed, **parameters)
     return scene
+
+
+def preset_names() -> list[str]:
+    """Return the names of the scenes that can be generated."""
+    return ["hamlet"]
 
 
 def code_digest(plugin: Detector | Evaluator) -> str:

@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..scenes.errors import UnsupportedError
@@ -15,8 +15,8 @@ from .executors import InProcess, cluster_executor, local_executor
 from .isolation import Limits, call_isolated
 from .plan import Judge, Overwrite, Plan, PlannedRun, scene_recipe
 from .provenance import code_version
-from .records import RunRow
 from .recipes import PluginRecipe, SceneRecipe, code_digest
+from .records import RunRow
 from .spool import spool
 from .store import Store
 from .tasks import Outcome, Score, Task
@@ -44,7 +44,7 @@ class Execution:
 
     jobs: int = 1
     scheduler: str | None = None
-    limits: Limits = Limits()
+    limits: Limits = field(default_factory=Limits)
 
 
 @dataclass(frozen=True, kw_only=True)

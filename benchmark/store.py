@@ -17,8 +17,8 @@ from typing import Any, Self
 
 from ..scenes.errors import InputError, OutputError
 from .keys import SourceClosure, canonical
-from .records import RunIdentity, RunRow, StoredScene, evaluation_key
 from .recipes import SceneRecipe
+from .records import RunIdentity, RunRow, StoredScene, evaluation_key
 from .schema import prepare
 from .store_reader import StoreReader
 from .tasks import Outcome, SceneRecord, Score

@@ -16,16 +16,16 @@ from ..scenes.errors import InputError, UnknownNameError
 from ..scenes.footprints import Footprints
 from ..scenes.raster import Grid
 from .keys import SourceClosure
-from .records import RunRow, StoredScene
 from .recipes import PluginRecipe, SceneRecipe
+from .records import RunRow, StoredScene
 from .tasks import Status, footprints_of
 
 __all__ = ["StoreReader"]
 
-_RUN_COLUMNS = """runs.id, runs.key, detector, label, parameters AS parameters_text, fingerprint, seed, scenes.name AS scene,
-    recipe AS recipe_text, scene_id,
-    scenes.key AS scene_key, scene_group, version, status, reason, traceback, finished, seconds, cpu_seconds,
-    peak_memory, detected"""
+_SELECT_RUNS = """SELECT runs.id, runs.key, detector, label, parameters AS parameters_text, fingerprint, seed,
+    scenes.name AS scene, recipe AS recipe_text, scene_id, scenes.key AS scene_key, scene_group, version, status,
+    reason, traceback, finished, seconds, cpu_seconds, peak_memory, detected
+    FROM runs JOIN scenes ON scenes.id = scene_id"""
 
 
 class StoreReader:
@@ -95,8 +95,8 @@ class StoreReader:
             if wanted is not None:
                 conditions.append(f"{column} {comparison} ?")
                 values.append(wanted)
-        query = f"""SELECT {_RUN_COLUMNS} FROM runs JOIN scenes ON scenes.id = scene_id
-            WHERE {" AND ".join(conditions)} ORDER BY runs.id DESC LIMIT ?"""  # noqa: S608 - column names of ours
+        where = " AND ".join(conditions)
+        query = f"{_SELECT_RUNS} WHERE {where} ORDER BY runs.id DESC LIMIT ?"
         rows = self._db.execute(query, (*values, -1 if limit is None else limit))
         return [_run_row(row) for row in rows]
 
@@ -105,8 +105,7 @@ class StoreReader:
         found = {}
         for some in _chunks(list(keys)):
             marks = ",".join("?" * len(some))
-            query = f"""SELECT {_RUN_COLUMNS} FROM runs JOIN scenes ON scenes.id = scene_id
-                WHERE runs.key IN ({marks})"""  # noqa: S608 - marks only
+            query = f"{_SELECT_RUNS} WHERE runs.key IN ({marks})"
             for row in self._db.execute(query, some):
                 found[str(row["key"])] = _run_row(row)
         return found
@@ -114,7 +113,7 @@ class StoreReader:
     def run(self, name: str | int) -> RunRow:
         """Return one run by its id or by the first digits of its key (at least four)."""
         text = str(name)
-        query = f"SELECT {_RUN_COLUMNS} FROM runs JOIN scenes ON scenes.id = scene_id WHERE "
+        query = f"{_SELECT_RUNS} WHERE "
         rows = []
         if text.isdecimal():
             rows = self._db.execute(query + "runs.id = ?", (int(text),)).fetchall()

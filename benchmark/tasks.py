@@ -25,7 +25,7 @@ from ..evaluators.base import Evaluation
 from ..scenes.footprints import Footprints
 from .recipes import PluginRecipe, SceneRecipe
 
-__all__ = ["Cost", "Outcome", "Score", "SceneRecord", "Task", "Status"]
+__all__ = ["Cost", "Outcome", "SceneRecord", "Score", "Status", "Task"]
 
 Status = Literal["ok", "failed", "skipped"]
 

@@ -207,7 +207,11 @@ class Leaderboard:
         right = ["left" if name in _LEFT else "right" for name in header]
         escaped = [[_escaped(cell) for cell in row] for row in rows]
         parts = [f"## {_escaped(self.title)}", self.caption() + "."]
-        parts.append(tabulate(escaped, [_escaped(name) for name in header], tablefmt="pipe", colalign=right, disable_numparse=True))
+        parts.append(
+            tabulate(
+                escaped, [_escaped(name) for name in header], tablefmt="pipe", colalign=right, disable_numparse=True
+            )
+        )
         parts += [f"- {_escaped(note)}" for note in self.notes]
         parts += [
             f"- {incident.status}: {_escaped(incident.label)} on {_escaped(incident.scene)}, seed {incident.seed}: "
@@ -234,7 +238,7 @@ class Leaderboard:
         header, rows = self._printed()
         fixed = [i for i, name in enumerate(header) if name in _FIXED]
         free = [i for i, name in enumerate(header) if name not in _FIXED]
-        widths = [max(len(name), *(len(row[i]) for row in rows)) + 2 for i, name in enumerate(header)]
+        widths = [max(len(name), *(len(row[i]) for row in rows)) + _GAP for i, name in enumerate(header)]
         chunks: list[list[int]] = [[]]
         for i in free:
             if chunks[-1] and sum(widths[j] for j in (*fixed, *chunks[-1], i)) > width:
@@ -242,13 +246,12 @@ class Leaderboard:
             chunks[-1].append(i)
         tables = []
         for chunk in chunks:
-            table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 2, 0, 0), show_edge=False)
+            table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), show_edge=False)
             for i in (*fixed, *chunk):
                 justify: Literal["left", "right"] = "left" if header[i] in _LEFT else "right"
                 table.add_column(header[i], justify=justify, no_wrap=True, overflow="ellipsis")
-            for number, row in enumerate(rows):
-                last = number + 1 == len(rows) or rows[number + 1][0] != row[0]
-                table.add_row(*(row[i] for i in (*fixed, *chunk)), end_section=last and False)
+            for row in rows:
+                table.add_row(*(row[i] for i in (*fixed, *chunk)))
             tables.append(table)
         return tables
 
@@ -274,14 +277,18 @@ class Leaderboard:
         return header, rows
 
 
+#: Characters between columns of a terminal table.
+_GAP = 2
 _FIXED = ("rank", "group", "detector", "over", "scenes")
 _LEFT = ("group", "detector", "over")
 
 
 def _escaped(text: str) -> str:
     """Escape what Markdown would take for markup in a table cell."""
-    for character in ("\\", "|", "*", "_", "<", ">", "[", "]", "`"):
-        text = text.replace(character, f"\\{character}" if character not in "<>" else {"<": "&lt;", ">": "&gt;"}[character])
+    for character in ("\\", "|", "*", "<", ">", "[", "]", "`"):
+        text = text.replace(
+            character, f"\\{character}" if character not in "<>" else {"<": "&lt;", ">": "&gt;"}[character]
+        )
     return " ".join(text.split())
 
 

@@ -91,8 +91,10 @@ def run(
         raise ParameterError("--resume goes on with what the store was asked for: leave out the suite and scenes")
     told = messages(quiet)
     with Store(store, must_exist=resume) as opened:
-        suite = suite_from_content(opened.last_plan()) if resume else suite_from_words(
-            words, detector, evaluator, seeds=detector_seeds
+        suite = (
+            suite_from_content(opened.last_plan())
+            if resume
+            else suite_from_words(words, detector, evaluator, seeds=detector_seeds)
         )
         if seeds is not None:
             suite = suite.with_seeds(seeds)

@@ -1,0 +1,26 @@
+from pathlib import Path
+
+import pytest
+
+from roofbench.benchmark.recipes import PluginRecipe, SceneRecipe
+from roofbench.benchmark.tasks import Task
+
+MISBEHAVING = f"{Path(__file__).parent / 'plugins' / 'misbehaving.py'}:Misbehaving"
+
+
+@pytest.fixture
+def misbehaving():
+    return MISBEHAVING
+
+
+@pytest.fixture
+def task_of():
+    def build(mode="good", *, seed=0, scene_seed=0, evaluators=("threshold-free",), **parameters):
+        return Task(
+            scene=SceneRecipe.of_preset("hamlet", seed=scene_seed),
+            detector=PluginRecipe(MISBEHAVING, {"mode": mode, **parameters}),
+            seed=seed,
+            evaluators=tuple(PluginRecipe(name, {}) for name in evaluators),
+        )
+
+    return build

@@ -1,0 +1,90 @@
+import pytest
+
+from roofbench.benchmark.suite import named_suite, read_suite, scenes_of, suite_names
+from roofbench.scenes.errors import RoofbenchError
+
+
+@pytest.fixture
+def suite_file(tmp_path, misbehaving):
+    def write(text):
+        path = tmp_path / "my.toml"
+        path.write_text(text.replace("PLUGIN", misbehaving))
+        return path
+
+    return write
+
+
+GOOD = """\
+name = "mine"
+
+[[scenes]]
+preset = "hamlet"
+seeds = [4, 7]
+
+[[detectors]]
+use = "PLUGIN"
+side = 7
+seeds = 3
+
+[[evaluators]]
+use = "threshold-free"
+matching = "overlap"
+"""
+
+
+def test_a_suite_lists_scenes_detectors_and_evaluators(suite_file):
+    suite = read_suite(suite_file(GOOD))
+    assert suite.name == "mine"
+    assert [scene.name for scene in suite.scenes] == ["hamlet-4", "hamlet-7"]
+    assert [(entrant.label, entrant.seeds) for entrant in suite.entrants] == [("misbehaving[side=7]", (0, 1, 2))]
+    assert [evaluator.matching for evaluator in suite.evaluators] == ["overlap"]
+
+
+def test_scenes_and_seeds_are_selected(suite_file):
+    suite = read_suite(suite_file(GOOD))
+    assert [scene.name for scene in suite.with_scenes("*-7").scenes] == ["hamlet-7"]
+    assert [scene.name for scene in suite.with_seeds(3).scenes] == ["hamlet-1", "hamlet-2", "hamlet-3"]
+    with pytest.raises(RoofbenchError, match="no scene of 'mine' matches"):
+        suite.with_scenes("knox*")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ('name = "mine"', 'nmae = "mine"', r"line 1: unknown key 'nmae' \(did you mean 'name'\?\)"),
+        ('"hamlet"', '"hamlt"', r"line 4: no preset 'hamlt' \(did you mean 'hamlet'\?\).* in \[\[scenes\]\] number 1"),
+        ("side = 7", "side = -7", r"line 9: misbehaving: side must be at least 0.1 m, not -7 in \[\[detectors\]\]"),
+        ("side = 7", "sied = 7", r"line 9: misbehaving: no parameter 'sied' \(did you mean 'side'\?\)"),
+        ("seeds = 3", 'seeds = "many"', r"line 10: seeds must be a number of seeds or a list"),
+        ('"threshold-free"', '"treshold-free"', r"line 13: no evaluator called 'treshold-free'"),
+        ('preset = "hamlet"', 'path = "nowhere"', r"line 5: 'seeds' is nothing that a scene with a path takes"),
+        ("[[scenes]]", "[scenes]", r"write scenes as tables with the heading \[\[scenes\]\]"),
+        ('preset = "hamlet"', "preset = ", r"no valid TOML: .*line 4"),
+    ],
+)
+def test_a_mistake_is_named_with_its_line(suite_file, before, after, message):
+    with pytest.raises(RoofbenchError, match=message):
+        read_suite(suite_file(GOOD.replace(before, after)))
+
+
+def test_a_list_is_a_sweep_axis(suite_file, monkeypatch):
+    suite = read_suite(suite_file(GOOD.replace("seeds = [4, 7]", "seeds = 2\nslope = [0, 5]")))
+    assert [scene.name for scene in suite.scenes] == [
+        "hamlet-1[slope=0]",
+        "hamlet-2[slope=0]",
+        "hamlet-1[slope=5]",
+        "hamlet-2[slope=5]",
+    ]
+    assert {scene.group for scene in suite.scenes} == {"hamlet[slope=0]", "hamlet[slope=5]"}
+
+
+def test_words_name_scenes():
+    (scene,) = scenes_of(["hamlet[seed=3]"])
+    assert (scene.name, scene.seed, scene.word) == ("hamlet-3", 3, "hamlet[seed=3]")
+    with pytest.raises(RoofbenchError, match=r"'hamet' is no scene folder and no preset \(did you mean 'hamlet'"):
+        scenes_of(["hamet"])
+
+
+@pytest.mark.parametrize("name", suite_names())
+def test_suites_that_come_with_roofbench_can_be_read(name):
+    assert named_suite(name).scenes
