@@ -51,10 +51,8 @@ def test_pooled_adds_counts_and_mean_averages_scenes(board, path_of_plugin):
     cells = entry(board, "side=9").cells
     for key in ("object.quality", "pixel.quality", "geometric.rmse"):
         assert cells[key].value == pooled.values[key]
-    by_scene = [
-        (a.values["object.quality"] + b.values["object.quality"]) / 2
-        for a, b in zip(evaluations[::2], evaluations[1::2], strict=True)
-    ]
+    qualities = [evaluation.values["object.quality"] for evaluation in evaluations]
+    by_scene = [(one + two) / 2 for one, two in zip(qualities[::2], qualities[1::2], strict=True)]
     assert entry(board, "side=9", "mean").cells["object.quality"].value == pytest.approx(sum(by_scene) / 3)
 
 
