@@ -91,6 +91,7 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None) -> 
     file = Path(path)
     with _opened(file) as reader:
         header = reader.header
+        _refuse_cut_off(file, header)
         scaling = np.concatenate([header.scales, header.offsets])
         if not np.isfinite(scaling).all() or (header.scales == 0).any():
             raise InputError(
@@ -259,6 +260,19 @@ def _opened(file: Path) -> Iterator[Any]:
     except (LaspyException, LazrsError, OSError, RuntimeError, ValueError, EOFError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{file} is truncated or broken ({reason}): copy or download it again") from error
+
+
+def _refuse_cut_off(file: Path, header: Any) -> None:
+    """Refuse a file that is shorter than its header says, before records of half a file are believed."""
+    needed = header.offset_to_point_data
+    if not header.are_points_compressed:
+        needed += header.point_count * header.point_format.size
+    size = file.stat().st_size
+    if size < needed:
+        raise InputError(
+            f"{file} is truncated: it has {size} bytes, its header announces at least {needed}; "
+            "copy or download it again"
+        )
 
 
 def _chunks(header: LasHeader, window: tuple[float, float, float, float] | None) -> Iterator[Any]:

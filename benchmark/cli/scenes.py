@@ -6,6 +6,7 @@ import glob
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -104,6 +105,79 @@ def import_(
             progress=progress,
         )
     typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.holdings)}")
+
+
+class _Format(StrEnum):
+    table = "table"
+    json = "json"
+
+
+@app.command()
+def check(
+    scene: Annotated[Path, typer.Argument(help="Scene folder.")],
+    output_format: Annotated[_Format, typer.Option("--format", help="How to print the facts.")] = _Format.table,
+    seal: Annotated[bool, typer.Option("--seal", help="Take edited files into the manifest.")] = False,
+) -> None:
+    """Check a scene folder and print what it holds; exit code 2 when something is wrong with it."""
+    import json
+
+    from ...scenes.checking import check_scene
+    from ...scenes.folder import seal_scene
+
+    for name in seal_scene(scene) if seal else ():
+        typer.echo(f"- {name} differed and was taken into the manifest", err=True)
+    report = check_scene(scene)
+    if output_format is _Format.json:
+        typer.echo(json.dumps({"facts": report.facts, "problems": report.problems}, indent=2))
+    else:
+        for part, facts in report.facts.items():
+            typer.echo(part)
+            width = max(map(len, facts), default=0)
+            for key, value in facts.items():
+                typer.echo(f"  {key.replace('_', ' '):<{width}}  {_told(key, value)}")
+    for problem in report.problems:
+        typer.echo(f"Error: {problem}", err=True)
+    if report.problems:
+        raise typer.Exit(2)
+
+
+#: Unit of a fact, by the last word of its name.
+_UNITS = {"density": "/m²", "gsd": "m", "height": "m", "width": "m", "area": "m²"}
+
+
+def _told(key: str, value: Any) -> str:
+    """Return a fact as people read it."""
+    unit = _UNITS.get(key.rpartition("_")[2], "")
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if key.endswith(("share", "coverage")):
+        return f"{value:.1%}"
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {count}" for name, count in value.items())
+    if isinstance(value, list):
+        return (" to " if unit else ", ").join(_told("", item) for item in value) + (f" {unit}" if unit else "")
+    if isinstance(value, float):
+        value = f"{value:.10g}" if value.is_integer() else f"{value:.2f}"
+    return f"{value} {unit}".rstrip()
+
+
+@app.command()
+def show(
+    scene: Annotated[Path, typer.Argument(help="Scene folder.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write: .png, .pdf or .svg.")],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture if it exists.")] = False,
+) -> None:
+    """Draw a scene: orthoimage, height above ground and reference side by side."""
+    from ...reports.scene_map import draw_scene
+    from ...scenes.errors import OutputError
+    from ...scenes.folder import open_scene
+    from ...scenes.output import whole_file
+
+    if output.suffix.lower() not in (".png", ".pdf", ".svg"):
+        raise OutputError(f"{output}: unknown file ending {output.suffix!r}; use .png, .pdf or .svg")
+    with whole_file(output, overwrite=overwrite) as scratch:
+        draw_scene(open_scene(scene)).savefig(scratch)
+    typer.echo(output)
 
 
 def _expanded(patterns: list[str] | None) -> list[str]:
