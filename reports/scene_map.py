@@ -6,32 +6,34 @@ reference footprints and the evaluation area over the relief.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import shapely
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PathCollection
+from matplotlib.colors import LightSource, Normalize, to_rgba
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..scenes.crs import crs_label
 from ..scenes.raster import Elevation, Grid
 from ..scenes.scene import Scene
 from ..scenes.surfaces import highest_surface, mean_intensity
+from .verdict_map import add_scale_bar, outlines
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-__all__ = ["add_scale_bar", "draw_scene"]
+__all__ = ["scene_figure"]
 
 #: Most cells along a side of a panel; more would not be seen.
 _MOST_CELLS = 1500
 _REFERENCE, _AREA = "#d7301f", "#08519c"
 
 
-def draw_scene(scene: Scene) -> Figure:
+def scene_figure(scene: Scene, *, dpi: int = 130) -> Figure:
     """Return a figure of up to three panels on one scale; what the scene lacks is left out."""
-    from matplotlib.figure import Figure
-
     surface = _surface(scene)
     panels: list[Any] = []
     if scene.image is not None:
@@ -46,7 +48,7 @@ def draw_scene(scene: Scene) -> Figure:
     xmin, ymin, xmax, ymax = scene.extent
     shape = float(np.clip((ymax - ymin) / (xmax - xmin), 0.3, 2.5))
     width = 4.6
-    figure = Figure(figsize=(width * len(panels) + 0.2, width * shape + 1.0), dpi=130, layout="constrained")
+    figure = Figure(figsize=(width * len(panels) + 0.2, width * shape + 1.0), dpi=dpi, layout="constrained")
     figure.suptitle(_title(scene), fontsize=11)
     for number, draw in enumerate(panels, start=1):
         axes = figure.add_subplot(1, len(panels), number)
@@ -56,28 +58,8 @@ def draw_scene(scene: Scene) -> Figure:
         axes.set_aspect("equal")
         axes.set_xticks([])
         axes.set_yticks([])
-        add_scale_bar(axes, xmax - xmin)
+        add_scale_bar(axes)
     return figure
-
-
-def add_scale_bar(axes: Axes, width: float) -> None:
-    """Add a scale bar of a round length, about a fifth of `width` metres, to the lower left of a map."""
-    from matplotlib.patches import Rectangle
-    from matplotlib.patheffects import withStroke
-
-    length = next(
-        step * 10.0**power for power in range(6, -3, -1) for step in (5, 2, 1) if step * 10.0**power <= width / 4
-    )
-    left, right = axes.get_xlim()
-    bottom, top = axes.get_ylim()
-    x, y = left + 0.04 * (right - left), bottom + 0.04 * (top - bottom)
-    height = 0.012 * max(right - left, top - bottom)
-    for part, colour in ((0.0, "black"), (0.5, "white")):
-        axes.add_patch(
-            Rectangle((x + part * length, y), length / 2, height, facecolor=colour, edgecolor="black", linewidth=0.7)
-        )
-    label = axes.text(x + length / 2, y + 1.6 * height, f"{length:g} m", ha="center", va="bottom", fontsize=8)
-    label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 
 def _title(scene: Scene) -> str:
@@ -128,10 +110,6 @@ def _draw_intensity(axes: Axes, intensity: Elevation) -> None:
 
 
 def _draw_height(axes: Axes, scene: Scene, surface: Elevation) -> None:
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
     height, label = _above_ground(scene, surface)
     known = height[np.isfinite(height)]
     low = 0.0 if scene.dem is not None else float(np.percentile(known, 1))
@@ -151,22 +129,20 @@ def _draw_height(axes: Axes, scene: Scene, surface: Elevation) -> None:
 
 
 def _draw_reference(axes: Axes, scene: Scene, surface: Elevation | None) -> None:
-    from matplotlib.collections import PatchCollection
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch, PathPatch
-
     if surface is not None:
         axes.imshow(0.3 + 0.7 * _shade(surface), cmap="gray", vmin=0, vmax=1, extent=_bounds(surface.grid))
     handles: list[Any] = []
     title = "No reference"
     if scene.reference is not None:
-        patches = [PathPatch(_path(polygon)) for polygon in scene.reference.polygons]
-        axes.add_collection(PatchCollection(patches, facecolor=(*_rgb(_REFERENCE), 0.3), edgecolor=_REFERENCE, lw=0.7))
+        fill = to_rgba(_REFERENCE, 0.3)
+        shapes = list(outlines(scene.reference.polygons))
+        axes.add_collection(PathCollection(shapes, facecolor=fill, edgecolor=_REFERENCE, linewidth=0.7))
         buildings = len(np.unique(scene.reference.building_codes))
-        title = f"Reference: {len(scene.reference)} footprints, {buildings} buildings"
-        handles.append(Patch(facecolor=(*_rgb(_REFERENCE), 0.3), edgecolor=_REFERENCE, label="reference"))
+        title = f"Reference: {len(scene.reference)} footprints, {buildings} building{'s' * (buildings != 1)}"
+        handles.append(Patch(facecolor=fill, edgecolor=_REFERENCE, label="reference"))
     if scene.area is not None:
-        axes.add_collection(PatchCollection([PathPatch(_path(scene.area))], facecolor="none", edgecolor=_AREA, lw=1.4))
+        border = list(outlines([scene.area]))
+        axes.add_collection(PathCollection(border, facecolor="none", edgecolor=_AREA, linewidth=1.4))
         handles.append(Line2D([], [], color=_AREA, lw=1.4, label="evaluation area"))
     axes.set_title(title, fontsize=9)
     if handles:
@@ -194,8 +170,6 @@ def _filled(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _shade(surface: Elevation) -> NDArray[np.float64]:
     """Return the relief lit from the north-west, 0 to 1."""
-    from matplotlib.colors import LightSource
-
     values = _filled(surface.values)
     values = np.where(np.isnan(values), np.nanmin(values) if np.isfinite(values).any() else 0, values)
     size = surface.grid.gsd
@@ -206,21 +180,3 @@ def _shade(surface: Elevation) -> NDArray[np.float64]:
 def _bounds(grid: Grid) -> tuple[float, float, float, float]:
     xmin, ymin, xmax, ymax = grid.extent
     return xmin, xmax, ymin, ymax
-
-
-def _path(geometry: shapely.Geometry) -> Any:
-    """Return polygons with their holes as one matplotlib path."""
-    from matplotlib.path import Path
-
-    rings = [
-        Path(shapely.get_coordinates(ring), closed=True)
-        for polygon in shapely.get_parts(geometry)
-        for ring in (polygon.exterior, *polygon.interiors)
-    ]
-    return Path.make_compound_path(*rings)
-
-
-def _rgb(colour: str) -> tuple[float, float, float]:
-    from matplotlib.colors import to_rgb
-
-    return to_rgb(colour)

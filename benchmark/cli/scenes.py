@@ -165,18 +165,15 @@ def _told(key: str, value: Any) -> str:
 def show(
     scene: Annotated[Path, typer.Argument(help="Scene folder.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write: .png, .pdf or .svg.")],
+    dpi: Annotated[int, typer.Option(min=30, max=600, help="Resolution; each panel is 4.6 inches wide.")] = 130,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture if it exists.")] = False,
 ) -> None:
     """Draw a scene: orthoimage, height above ground and reference side by side."""
-    from ...reports.scene_map import draw_scene
-    from ...scenes.errors import OutputError
+    from ...reports.figures import save_figure
+    from ...reports.scene_map import scene_figure
     from ...scenes.folder import open_scene
-    from ...scenes.output import whole_file
 
-    if output.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise OutputError(f"{output}: unknown file ending {output.suffix!r}; use .png, .pdf or .svg")
-    with whole_file(output, overwrite=overwrite) as scratch:
-        draw_scene(open_scene(scene)).savefig(scratch)
+    save_figure(scene_figure(open_scene(scene), dpi=dpi), output, overwrite=overwrite)
     typer.echo(output)
 
 

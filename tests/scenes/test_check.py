@@ -1,0 +1,121 @@
+import json
+
+import numpy as np
+import pytest
+import shapely
+import small_scenes
+from command_line import run
+
+import roofbench as rb
+from roofbench.scenes.checking import check_scene
+from roofbench.scenes.las_files import write_points
+from roofbench.scenes.raster_files import write_elevation, write_image
+
+
+@pytest.fixture
+def saved(tmp_path):
+    rb.save_scene(small_scenes.scene(), tmp_path / "small")
+    return tmp_path / "small"
+
+
+@pytest.fixture
+def check(saved, monkeypatch, capsys):
+    return lambda *more: run(monkeypatch, capsys, "scenes", "check", saved, *more)
+
+
+def test_a_sound_scene_has_no_problems(check):
+    code, out, err = check()
+    assert (code, err) == (0, "")
+    assert "count                  4000" in out
+    assert "bands          red, green, blue" in out
+
+
+def test_facts_are_those_of_the_scene(saved):
+    report = check_scene(saved)
+    truth = small_scenes.scene()
+    assert report.problems == ()
+    points = report.facts["points"]
+    assert points["count"] == 4000
+    assert points["density"] == points["first_return_density"] == 4000 / 1600
+    assert points["multiple_return_share"] == np.mean(truth.points.number_of_returns > 1)
+    assert points["classes"] == {
+        "2": int((truth.points.classification == 2).sum()),
+        "6": int((truth.points.classification == 6).sum()),
+    }
+    assert report.facts["image"]["gsd"] == 0.5
+    assert report.facts["dem"]["height"] == [100.0, 100.0]
+    assert report.facts["dem"]["unknown_share"] == pytest.approx(1 / 1600)
+    assert report.facts["dem"]["derived"] == "by hand"
+    reference = report.facts["reference"]
+    assert (reference["footprints"], reference["buildings"], reference["area"]) == (2, 1, 150 + 84)
+    assert report.facts["area"]["share"] == pytest.approx(38**2 / 1600)
+
+
+def test_facts_are_told_as_json(check):
+    code, out, _ = check("--format", "json")
+    assert code == 0
+    told = json.loads(out)
+    assert told["problems"] == []
+    assert told["facts"]["points"]["count"] == 4000
+
+
+def test_an_edited_file_is_told_until_it_is_sealed(saved, check):
+    write_points(small_scenes.cloud(50), saved / "points.laz", crs=small_scenes.CRS)
+    code, _, err = check()
+    assert code == 2
+    assert "points.laz changed since the manifest was written: if that is meant, add --seal" in err
+    code, _, err = check("--seal")
+    assert (code, err) == (0, "- points.laz differed and was taken into the manifest\n")
+    assert check()[0] == 0
+
+
+def _shifted_image(saved):
+    write_image(small_scenes.image(west=small_scenes.WEST + 30), saved / "ortho.tif", crs=small_scenes.CRS)
+
+
+def _far_points(saved):
+    write_points(small_scenes.cloud(west=0.0), saved / "points.laz", crs=small_scenes.CRS)
+
+
+def _empty_dem(saved):
+    grid = small_scenes.scene().dem.grid
+    write_elevation(
+        rb.Elevation(np.full(grid.shape, np.nan, np.float32), grid), saved / "dem.tif", crs=small_scenes.CRS
+    )
+
+
+def _other_crs(saved):
+    write_image(small_scenes.image(), saved / "ortho.tif", crs="EPSG:25833")
+
+
+def _far_reference(saved):
+    far = rb.Footprints.of([shapely.box(0, 0, 9, 9)], crs=small_scenes.CRS)
+    rb.write_footprints(far, saved / "reference.gpkg", overwrite=True)
+
+
+def _broken_points(saved):
+    (saved / "points.laz").write_bytes((saved / "points.laz").read_bytes()[:-500])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "problem"),
+    [
+        (_shifted_image, "ortho.tif covers only 25% of the extent"),
+        (_far_points, "points.laz: 100% of the points lie outside"),
+        (_empty_dem, "dem.tif holds no height (all NaN)"),
+        (_other_crs, "ortho.tif is in EPSG:25833, but the scene in EPSG:25832"),
+        (_far_reference, "reference.gpkg lies outside the extent"),
+        (_broken_points, "points.laz is truncated or broken"),
+    ],
+)
+def test_what_does_not_fit_is_told(saved, check, spoil, problem):
+    spoil(saved)
+    code, _, err = check("--seal")
+    assert code == 2
+    assert problem in err
+
+
+def test_a_folder_that_is_no_scene_is_refused(tmp_path, monkeypatch, capsys):
+    code, out, err = run(monkeypatch, capsys, "scenes", "check", tmp_path)
+    assert (code, out) == (2, "")
+    assert "there is no scene.toml in it" in err
