@@ -60,3 +60,25 @@ def rotation_candidates(directions: np.ndarray, centres: np.ndarray, radius: flo
         if math.isfinite(best):
             out[j] = best
     return out
+
+
+def local_entropy(grey: np.ndarray, window: int) -> np.ndarray:
+    """Share of the largest possible entropy of a window, by its definition."""
+    reach = window // 2
+    out = np.zeros(grey.shape)
+    for row in range(grey.shape[0]):
+        for column in range(grey.shape[1]):
+            part = grey[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1]
+            p = np.unique(part, return_counts=True)[1] / part.size
+            out[row, column] = -(p * np.log2(p)).sum() / math.log2(window**2)
+    return out
+
+
+def length_in_box(line: np.ndarray, box: np.ndarray, steps: int = 20000) -> float:
+    """Length of a line in a box by walking along it."""
+    t = line[U0] + (np.arange(steps) + 0.5) * (line[U1] - line[U0]) / steps
+    x, y = line[OX] + t * line[UX], line[OY] + t * line[UY]
+    dx, dy = x - box[OX], y - box[OY]
+    u, v = dx * box[UX] + dy * box[UY], -dx * box[UY] + dy * box[UX]
+    inside = (u >= box[U0]) & (u <= box[U1]) & (v >= box[V0]) & (v <= box[V1])
+    return float(inside.mean() * (line[U1] - line[U0]))

@@ -22,20 +22,20 @@ WINDOW = 9
 
 
 @njit(cache=True)
-def _grey(red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], shift: int) -> NDArray[np.uint8]:
+def _grey(red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], unit: int) -> NDArray[np.uint8]:
     rows, columns = red.shape
     grey = np.empty((rows, columns), dtype=np.uint8)
     for row in range(rows):
         for column in range(columns):
             r, g, b = np.int64(red[row, column]), np.int64(green[row, column]), np.int64(blue[row, column])
-            grey[row, column] = ((299 * r + 587 * g + 114 * b + 500) // 1000) >> shift
+            grey[row, column] = (299 * r + 587 * g + 114 * b + 500 * unit) // (1000 * unit)
     return grey
 
 
 def grey_levels(image: Image) -> NDArray[np.uint8]:
     """Return the intensity of a colour image as 256 grey levels, shape (rows, columns)."""
     red, green, blue = (image.values[image.bands.index(name)] for name in ("red", "green", "blue"))
-    grey: NDArray[np.uint8] = _grey(red, green, blue, 0 if image.values.dtype == np.uint8 else 8)
+    grey: NDArray[np.uint8] = _grey(red, green, blue, int(np.iinfo(image.values.dtype).max) // 255)
     return grey
 
 

@@ -7,8 +7,9 @@ chain
 image line
     Line fitted to a piece of a chain between corners, like the lines around black shapes.
 
-Canny's thresholds follow the image: 70 % of the cells have a gradient below the upper one, and the lower one is 0.4 of
-it. Source: Awrangjeb, Zhang & Fraser (2011), sections 3.3 and 3.4, which print no edge detector parameters.
+Canny's upper threshold follows the image, 70 % of whose cells have a smaller gradient, but is at least that of a step
+of some grey levels, so that the noise of a plain scene makes no edges; the lower threshold is 0.4 of it.
+Source: Awrangjeb, Zhang & Fraser (2011), sections 3.3 and 3.4, which print no edge detector parameters.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ __all__ = ["ImageEdges", "extract_edges"]
 #: Share of the cells whose gradient is below Canny's upper threshold, and its lower threshold as a share of the upper.
 _QUIET_SHARE = 0.7
 _LOWER = 0.4
+#: Variance of the smoothing that the Sobel filter itself does along the gradient, square pixels.
+_SOBEL_VARIANCE = 0.7
 _NEIGHBOURS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1)])
 
 
@@ -53,12 +56,17 @@ class ImageEdges:
     lines: Boxes
 
 
-def edge_pixels(grey: NDArray[np.uint8], blur: float) -> NDArray[np.uint8]:
-    """Return Canny's edge map of a grey image blurred with sigma `blur` pixels, 1 = edge."""
+def edge_pixels(grey: NDArray[np.uint8], blur: float, contrast: float) -> NDArray[np.uint8]:
+    """Return Canny's edge map of a grey image blurred with sigma `blur` pixels, 1 = edge.
+
+    `contrast` is the least step in grey levels that starts an edge.
+    """
     smooth = cv2.GaussianBlur(grey, (0, 0), blur) if blur > 0 else grey
     dx, dy = cv2.Sobel(smooth, cv2.CV_16S, 1, 0), cv2.Sobel(smooth, cv2.CV_16S, 0, 1)
     strength = np.hypot(dx[::4, ::4].astype(np.float32), dy[::4, ::4].astype(np.float32))
-    upper = max(float(np.quantile(strength, _QUIET_SHARE)), 1.0)
+    # A blurred step of one grey level has the slope 1 / (sqrt(2 pi) sigma); Sobel multiplies it by 8.
+    step = 8 * contrast / math.sqrt(2 * math.pi * (blur**2 + _SOBEL_VARIANCE))
+    upper = max(float(np.quantile(strength, _QUIET_SHARE)), step, 1.0)
     edges = cv2.Canny(dx, dy, _LOWER * upper, upper, L2gradient=True)
     return np.asarray(edges > 0).view(np.uint8)
 
@@ -137,6 +145,7 @@ def extract_edges(
     *,
     gsd: float,
     blur: float,
+    contrast: float,
     shortest: float,
     smoothing: float,
     product: float,
@@ -144,9 +153,10 @@ def extract_edges(
 ) -> ImageEdges:
     """Extract the edges of a grey image that are at least `shortest` metres long, and their lines of that length.
 
-    `blur` is in pixels; `smoothing`, `product` and `straight` are those of `find_corners`.
+    `blur` is in pixels, `contrast` in grey levels (see `edge_pixels`); `smoothing`, `product` and `straight` are those
+    of `find_corners`.
     """
-    points, offsets = link_pixels(edge_pixels(grey, blur), max(2, math.ceil(shortest / gsd / math.sqrt(2))))
+    points, offsets = link_pixels(edge_pixels(grey, blur, contrast), max(2, math.ceil(shortest / gsd / math.sqrt(2))))
     curves = sample_curves(points, offsets, np.arange(len(offsets) - 1), closed=False, spacing=SAMPLE / gsd)
     long_enough = np.flatnonzero((np.diff(curves.offsets) - 1) * curves.spacing * gsd >= shortest - SAMPLE / 2)
     curves = _take(curves, long_enough)

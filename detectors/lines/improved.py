@@ -78,6 +78,10 @@ class Improved(LineDetector):
         doc="sigma of the Gaussian before image edges are detected; reading",
         source="2011, 3.4",
     )
+    edge_contrast: float = parameter(
+        10.0, unit="grey levels", minimum=0, doc="least step in brightness that starts an image edge",
+        source="2011, 3.4; reading",
+    )  # fmt: skip
     most_edges: float = parameter(
         90.0, unit="m", minimum=0, doc="most length of edges in a building (tests 2 and 5)", source="2011, 3.4"
     )
@@ -176,6 +180,7 @@ class Improved(LineDetector):
             grey_levels(rasters.image),
             gsd=rasters.gsd,
             blur=self.edge_blur,
+            contrast=self.edge_contrast,
             shortest=self.minimum_side,
             smoothing=self.smoothing * PAPER_PIXEL / SAMPLE,
             product=self.corner_product,

@@ -30,7 +30,7 @@ from .boxes import U0, U1, V0, V1, Boxes, box_corners, lengths, to_box, widths
 from .contours import SAMPLE, Curves
 from .image_edges import ImageEdges
 
-__all__ = ["BIN_COUNT", "Texture", "histograms_of", "tests_passed"]
+__all__ = ["BIN_COUNT", "Texture", "apply_tests", "histograms_of"]
 
 #: Bins of 5 degrees in 180, the outer two merged.
 BIN_COUNT = 35
@@ -166,7 +166,7 @@ def _falls_after(histogram: NDArray[np.float64], k: int) -> bool:
     return False
 
 
-def tests_passed(
+def apply_tests(
     collective: NDArray[np.float64],
     strongest: NDArray[np.float64],
     areas: NDArray[np.float64],
@@ -217,8 +217,8 @@ def judge(
     most_edges: float,
     area_per_edge: float,
 ) -> Texture:
-    """Return the histograms and tests of candidate rectangles; see `tests_passed` for the limits."""
+    """Return the histograms and tests of candidate rectangles; see `apply_tests` for the limits."""
     collective, strongest = histograms_of(boxes, edges.curves, edges.points, shape)
     areas = lengths(boxes) * widths(boxes) * gsd**2
     limits = {"least": least, "most_edges": most_edges, "area_per_edge": area_per_edge}
-    return Texture(edges, collective, strongest, tests_passed(collective, strongest, areas, **limits))
+    return Texture(edges, collective, strongest, apply_tests(collective, strongest, areas, **limits))
