@@ -45,6 +45,8 @@ def _columns(table: pd.DataFrame) -> Mapping[str, NDArray[Any]]:
     columns: dict[str, NDArray[Any]] = {}
     for name in table.columns.drop("geometry"):
         column = table[name]
+        # GDAL takes a GeoJSON property "id" for the feature's own number, which must be unique.
+        name = "source_id" if name == "id" else name
         if str(column.dtype) == "Int64":
             missing = column.isna().to_numpy()
             columns[name] = np.ma.masked_array(column.fillna(-1).to_numpy(dtype=np.int64), missing)

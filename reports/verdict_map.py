@@ -148,19 +148,10 @@ def add_scale_bar(axes: Axes) -> None:
     step = 10 ** math.floor(math.log10(target))
     length = max(factor * step for factor in (1, 2, 5) if factor * step <= target)
     x, y = xmin + 0.03 * width, ymin + 0.03 * height
-    axes.add_patch(
-        Rectangle(
-            (x - 0.01 * width, y - 0.012 * height),
-            length + 0.02 * width,
-            0.06 * height,
-            color="white",
-            alpha=0.8,
-            zorder=5,
-        )
-    )
     axes.add_patch(Rectangle((x, y), length, 0.008 * height, color="black", zorder=6))
     label = f"{length / 1000:g} km" if length >= 1000 else f"{length:g} m"
-    axes.text(x + length / 2, y + 0.013 * height, label, ha="center", va="bottom", fontsize=9, zorder=6)
+    background = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.5}
+    axes.text(x + length / 2, y + 0.02 * height, label, ha="center", va="bottom", fontsize=9, zorder=6, bbox=background)
 
 
 def _ring_codes(count: int) -> NDArray[np.uint8]:

@@ -6,6 +6,7 @@ A layer of a file with several is named as QGIS does, ``city.gpkg|layername=roof
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -227,20 +228,23 @@ def _write_ogr(
     # A GeoPackage stores when it was written; a fixed date makes equal content equal bytes, which scenes rely on.
     pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": "2000-01-01T00:00:00.000Z"})
     try:
-        pyogrio.raw.write(
-            file,
-            geometry=shapely.to_wkb(geometries, flavor="iso"),
-            field_data=list(values.values()),
-            fields=np.array(list(values), dtype=object),
-            layer=None if driver == "GeoJSON" and not layer else layer,
-            driver=driver,
-            geometry_type=kind,
-            promote_to_multi=kind.startswith("Multi"),
-            field_mask=[np.ma.getmaskarray(column) for column in columns.values()] if columns else None,
-            crs=crs,
-            append=append,
-            **({"SPATIAL_INDEX": "NO"} if driver == "FlatGeobuf" and not len(geometries) else {}),
-        )
+        with warnings.catch_warnings():
+            # A set without CRS is written without one; that is no surprise to whoever made it.
+            warnings.filterwarnings("ignore", message="'crs' was not provided")
+            pyogrio.raw.write(
+                file,
+                geometry=shapely.to_wkb(geometries, flavor="iso"),
+                field_data=list(values.values()),
+                fields=np.array(list(values), dtype=object),
+                layer=None if driver == "GeoJSON" and not layer else layer,
+                driver=driver,
+                geometry_type=kind,
+                promote_to_multi=kind.startswith("Multi"),
+                field_mask=[np.ma.getmaskarray(column) for column in columns.values()] if columns else None,
+                crs=crs,
+                append=append,
+                **({"SPATIAL_INDEX": "NO"} if driver == "FlatGeobuf" and not len(geometries) else {}),
+            )
     except DataSourceError as error:
         raise OutputError(f"{file.name} cannot be written: {error}") from error
     finally:
@@ -306,7 +310,7 @@ def _building_ids(file: Path, columns: Mapping[str, NDArray[Any]], name: str | N
 
 def _in_degrees_at_most(file: Path, crs: str | None, geometries: NDArray[np.object_]) -> bool:
     """Return False for a GeoJSON whose CRS is the WGS 84 of RFC 7946 but whose coordinates cannot be degrees."""
-    if crs != "EPSG:4326" or DRIVERS.get(file.suffix.lower()) != "GeoJSON":
+    if crs != "EPSG:4326" or DRIVERS.get(file.suffix.lower()) != "GeoJSON" or not len(geometries):
         return True
     xmin, ymin, xmax, ymax = shapely.total_bounds(geometries)
     return not (max(abs(xmin), abs(xmax)) > 360 or max(abs(ymin), abs(ymax)) > 90)

@@ -41,12 +41,12 @@ def test_height_is_drawn_where_the_building_is():
     assert np.median(y) == pytest.approx(17.5, abs=1)
 
 
-def test_the_command_writes_a_picture(tmp_path, monkeypatch, capsys):
+def test_the_command_writes_a_picture(tmp_path):
     rb.save_scene(small_scenes.scene(), tmp_path / "small")
     picture = tmp_path / "small.png"
-    code, out, _ = run(monkeypatch, capsys, "scenes", "show", tmp_path / "small", "-o", picture, "--dpi", 50)
+    code, out, _ = run("scenes", "show", tmp_path / "small", "-o", picture, "--dpi", 50)
     assert (code, out) == (0, f"{picture}\n")
     assert picture.read_bytes().startswith(b"\x89PNG")
-    code, _, err = run(monkeypatch, capsys, "scenes", "show", tmp_path / "small", "-o", tmp_path / "small.gif")
+    code, _, err = run("scenes", "show", tmp_path / "small", "-o", tmp_path / "small.gif")
     assert code == 2
     assert "small.gif: unknown file ending '.gif'" in err

@@ -19,8 +19,8 @@ def saved(tmp_path):
 
 
 @pytest.fixture
-def check(saved, monkeypatch, capsys):
-    return lambda *more: run(monkeypatch, capsys, "scenes", "check", saved, *more)
+def check(saved):
+    return lambda *more: run("scenes", "check", saved, *more)
 
 
 def test_a_sound_scene_has_no_problems(check):
@@ -115,7 +115,7 @@ def test_what_does_not_fit_is_told(saved, check, spoil, problem):
     assert problem in err
 
 
-def test_a_folder_that_is_no_scene_is_refused(tmp_path, monkeypatch, capsys):
-    code, out, err = run(monkeypatch, capsys, "scenes", "check", tmp_path)
+def test_a_folder_that_is_no_scene_is_refused(tmp_path):
+    code, out, err = run("scenes", "check", tmp_path)
     assert (code, out) == (2, "")
     assert "there is no scene.toml in it" in err

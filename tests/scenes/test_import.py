@@ -32,10 +32,10 @@ def files(tmp_path):
 
 
 @pytest.fixture
-def bring(files, monkeypatch, capsys):
+def bring(files, monkeypatch):
     """Run ``roofbench scenes import`` inside the folder of the files."""
     monkeypatch.chdir(files)
-    return lambda *arguments: run(monkeypatch, capsys, "scenes", "import", "-o", "out", *arguments)
+    return lambda *arguments: run("scenes", "import", "-o", "out", *arguments)
 
 
 @pytest.fixture
@@ -573,9 +573,9 @@ def test_options_that_do_not_fit(refused, arguments, message):
     assert message in refused(*arguments)
 
 
-def test_a_folder_that_cannot_be_written(files, monkeypatch, capsys):
+def test_a_folder_that_cannot_be_written(files, monkeypatch):
     monkeypatch.chdir(files)
-    code, _, err = run(monkeypatch, capsys, "scenes", "import", "points.laz", "-o", "no/such/folder")
+    code, _, err = run("scenes", "import", "points.laz", "-o", "no/such/folder")
     assert code == 2
     assert "no/such/folder cannot be written: there is no folder no/such" in err
 

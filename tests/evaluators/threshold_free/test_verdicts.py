@@ -1,0 +1,97 @@
+"""Every object says what it counts as, and why."""
+
+import numpy as np
+import pytest
+import shapely
+
+import roofbench as rb
+
+
+def verdicts(detected, reference, building=None, **more):
+    evaluation = rb.evaluate(rb.Footprints.of(detected), rb.Footprints.of(reference, building_ids=building), **more)
+    return evaluation.verdicts
+
+
+def house(x, y=0.0, width=10.0, depth=10.0):
+    return shapely.box(x, y, x + width, y + depth)
+
+
+def test_a_found_building_tells_its_shift_iou_and_corner_distance():
+    found = verdicts([house(2)], [house(0)])
+    (detection,) = found.detections.itertuples()
+    assert (detection.verdict, detection.partner) == ("TP", 0)
+    assert detection.reason == "found reference 0, shifted 2.0 m"
+    assert detection.distance == detection.rmse == pytest.approx(2)
+    assert detection.overlap_area == pytest.approx(80)
+    assert detection.iou == pytest.approx(80 / 120)
+    assert found.references.loc[0, "reason"] == "found by detection 0, shifted 2.0 m"
+
+
+def test_a_false_alarm_and_a_missed_building_have_no_partner():
+    found = verdicts([house(100)], [house(0)])
+    assert found.detections.loc[0, "verdict"] == "FP"
+    assert found.detections.loc[0, "reason"] == "false alarm: overlaps no reference"
+    assert found.references.loc[0, "verdict"] == "FN"
+    assert found.references.loc[0, "reason"] == "missed: no detection overlaps it"
+    assert found.detections["partner"].isna().all()
+    assert np.isnan(found.detections.loc[0, "distance"])
+
+
+def test_two_houses_in_one_detection_are_merged():
+    found = verdicts([shapely.box(0, 0, 20, 10)], [house(0, width=9), house(11, width=9)])
+    assert found.references["verdict"].tolist() == ["TP", "FN"]
+    assert found.references.loc[1, "reason"] == "merged with reference 0 into detection 0"
+    assert "also covers part of reference 1" in found.detections.loc[0, "reason"]
+
+
+def test_a_house_in_three_pieces_is_split():
+    found = verdicts([house(0, width=3), house(3.5, width=3), house(7, width=3)], [house(0)])
+    assert found.detections["verdict"].tolist() == ["MD", "TP", "MD"]
+    assert (
+        found.detections.loc[0, "reason"] == "duplicate of detection 1 on reference 0, which is split into 3 detections"
+    )
+    assert found.references.loc[0, "reason"].endswith("split into 3 detections")
+
+
+def test_objects_are_named_by_their_row_in_the_source():
+    found = verdicts([shapely.Polygon(), house(1)], [shapely.Point(0, 0), house(0)])
+    assert found.detections["id"].tolist() == [1]
+    assert found.detections.loc[0, "reason"] == "found reference 1, shifted 1.0 m"
+
+
+def test_what_is_left_out_says_so():
+    area = shapely.box(-5, -5, 30, 30)
+    found = verdicts([house(0), house(100)], [house(0), house(101), house(12, width=2, depth=2)], area=area)
+    assert found.detections["verdict"].tolist() == ["TP", "left out"]
+    assert found.references["verdict"].tolist() == ["TP", "left out", "FN"]
+    assert "outside the evaluation area" in found.references.loc[1, "reason"]
+    small = verdicts([house(12, width=2, depth=2)], [house(12, width=2, depth=2)], minimum_area=5)
+    assert small.references.loc[0, "reason"] == "left out: smaller than the minimum area"
+    assert small.detections.loc[0, "reason"] == "left out: overlaps only references that are left out"
+
+
+def test_a_pooled_evaluation_has_no_verdicts():
+    one = rb.evaluate(rb.Footprints.of([house(0)]), rb.Footprints.of([house(0)]))
+    assert rb.pool([one, one]).verdicts is None
+    assert rb.pool([one, one]).counts.true_positives == 2
+
+
+def test_parts_of_one_building_overlap_naturally():
+    wings = [house(0, width=20), house(5, width=6, depth=30)]
+    together = rb.evaluate(rb.Footprints.of(wings), rb.Footprints.of(wings, building_ids=[7, 7]))
+    apart = rb.evaluate(rb.Footprints.of(wings), rb.Footprints.of(wings))
+    assert together.object.detection_overlap_rate == together.object.detection_cross_lap_rate == 0
+    assert together.object.reference_cross_lap_rate == 0
+    assert apart.object.detection_overlap_rate == apart.object.detection_cross_lap_rate == 1
+    assert together.values["building.complete_all"] == 1
+
+
+def test_one_pass_matching_leaves_a_reference_that_sweeping_finds():
+    # Both detections are nearest to the left reference; the right one overlaps the second detection only.
+    detected = [house(0), house(1.0, width=12)]
+    reference = [house(0.2), house(10.5)]
+    swept = rb.evaluate(rb.Footprints.of(detected), rb.Footprints.of(reference))
+    literal = rb.evaluate(rb.Footprints.of(detected), rb.Footprints.of(reference), matching="one-pass")
+    assert swept.counts.true_positives == 2
+    assert literal.counts.true_positives == 1
+    assert literal.verdicts.references.loc[1, "reason"].startswith("missed: detection 1 overlaps it")
