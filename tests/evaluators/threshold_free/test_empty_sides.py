@@ -1,6 +1,7 @@
 import pytest
-import roofbench as rb
 import shapely
+
+import roofbench as rb
 
 OVERLAPPING = rb.Footprints.of([shapely.box(0, 0, 10, 10), shapely.box(5, 5, 15, 15)])
 NOTHING = rb.Footprints.empty()
