@@ -10,8 +10,8 @@ high share
 multiple share
     High points whose pulse gave several returns, among the high points around: 0 on a roof, 1 in a crown.
 roughness
-    Standard deviation, metres, of the high points of 3 x 3 cells about their plane; each cell takes the smoothest of
-    the windows that hold it, so that ridges, eaves and steps between roofs stay smooth.
+    Standard deviation, metres, of the high points of a window about their plane; each cell takes the smoothest of the
+    windows that hold it, so that ridges, eaves and steps between roofs stay smooth.
 greenness
     (NIR - R) / (NIR + R), or (G - R) / (G + R) without near infrared; NaN in the dark, where colours are noise.
 
@@ -33,10 +33,13 @@ __all__ = ["CellCues", "cell_cues", "greenness"]
 
 _Floats = NDArray[np.float32]
 
-#: Number of moments kept per cell: n, x, y, z, xx, xy, yy, xz, yz, zz.
-_MOMENTS = 10
+#: A cell without points takes the high share of the cells around when these hold at least so many points.
+_NEIGHBOURS = 3
 #: A plane through fewer points than this fits by chance.
 _LEAST_POINTS = 6
+#: Least ratio of the spread of the points in two directions (determinant over squared mean of their covariance).
+_FLATTEST = 1e-3
+#: Where there is no plane: a deviation that is never the least.
 _NO_PLANE = np.float32(1e9)
 
 
@@ -50,7 +53,7 @@ class CellCues:
     count : ndarray
         Points per cell, high or low.
     high_share : ndarray
-        Per cell; NaN without points.
+        Per cell, or over 3 x 3 cells where a cell has no points; NaN where those have none either.
     penetration : ndarray
         1 - high share over 3 x 3 cells.
     multiple_share : ndarray or None
@@ -70,7 +73,9 @@ class CellCues:
     height: _Floats
 
 
-def cell_cues(points: PointCloud, heights: NDArray[np.float32], grid: Grid, *, threshold: float) -> CellCues:
+def cell_cues(
+    points: PointCloud, heights: NDArray[np.float32], grid: Grid, *, threshold: float, window: float
+) -> CellCues:
     """Gather the cues of points on a grid.
 
     Parameters
@@ -81,17 +86,15 @@ def cell_cues(points: PointCloud, heights: NDArray[np.float32], grid: Grid, *, t
     grid : Grid
     threshold : float
         Height in metres above which a point is high.
+    window : float
+        Width in metres of the windows in which planes are fitted; at least two cells.
     """
-    import cv2
-
     index, inside = grid.cells(points.x, points.y)
     used = np.flatnonzero(inside & np.isfinite(heights))
     size = grid.rows * grid.columns
     high = used[heights[used] > threshold]
     count = _on_grid(np.bincount(index[used], minlength=size), grid)
-    moments = np.zeros((grid.rows, grid.columns, _MOMENTS))
-    _gather(points.x, points.y, points.z, index, high, grid.west, grid.north, grid.gsd, moments)
-    n_high = moments[..., 0].astype(np.float32)
+    n_high = _on_grid(np.bincount(index[high], minlength=size), grid)
     sums = np.bincount(index[high], weights=heights[high], minlength=size)
 
     multiple_share = None
@@ -99,14 +102,16 @@ def cell_cues(points: PointCloud, heights: NDArray[np.float32], grid: Grid, *, t
     if returns is not None and (returns[used] > 1).any():
         multiple = _on_grid(np.bincount(index[high[returns[high] > 1]], minlength=size), grid)
         multiple_share = _share(_box(multiple), _box(n_high))
-    roughness = _roughness(moments, grid.gsd)
-    # Where there is no plane, a deviation that never wins.
-    smoothest = cv2.erode(np.where(np.isnan(roughness), _NO_PLANE, roughness), np.ones((3, 3), np.uint8))
+    middle = grid.to_world(grid.rows / 2, grid.columns / 2)
+    base = float(points.z[high].mean()) if len(high) else 0.0
+    moments = _moments(points.x, points.y, points.z, index, high, np.array(middle), base, grid.shape)
+    smoothest = _smoothest_plane(moments, max(2, round(window / grid.gsd)))
+    shared = _share(_box(n_high), _box(count))
     return CellCues(
         grid=grid,
         count=count,
-        high_share=_share(n_high, count),
-        penetration=1 - _share(_box(n_high), _box(count)),
+        high_share=np.where((count > 0) | (_box(count) < _NEIGHBOURS), _share(n_high, count), shared),
+        penetration=1 - shared,
         multiple_share=multiple_share,
         roughness=np.where((smoothest < _NO_PLANE) & (n_high > 0), smoothest, np.float32(np.nan)),
         height=_share(_on_grid(sums, grid), n_high),
@@ -169,64 +174,64 @@ def _share(part: _Floats, whole: _Floats) -> _Floats:
 
 
 @njit(cache=True)
-def _gather(x, y, z, index, chosen, west, north, cell, moments):  # type: ignore[no-untyped-def]
-    """Add the moments of the chosen points to their cells, relative to the cell's centre and first height."""
-    columns = moments.shape[1]
+def _moments(x, y, z, index, chosen, middle, base, shape):  # type: ignore[no-untyped-def]
+    """Return n, x, y, z, xx, xy, yy, xz, yz, zz of the chosen points per cell, from the middle of the grid."""
+    sums = np.zeros((10, shape[0] * shape[1]))
     for i in chosen:
-        r, c = index[i] // columns, index[i] % columns
-        dx = x[i] - (west + (c + 0.5) * cell)
-        dy = y[i] - (north - (r + 0.5) * cell)
-        dz = z[i]
-        m = moments[r, c]
-        m[0] += 1
-        m[1] += dx
-        m[2] += dy
-        m[3] += dz
-        m[4] += dx * dx
-        m[5] += dx * dy
-        m[6] += dy * dy
-        m[7] += dx * dz
-        m[8] += dy * dz
-        m[9] += dz * dz
+        cell = index[i]
+        dx, dy, dz = x[i] - middle[0], y[i] - middle[1], z[i] - base
+        sums[0, cell] += 1
+        sums[1, cell] += dx
+        sums[2, cell] += dy
+        sums[3, cell] += dz
+        sums[4, cell] += dx * dx
+        sums[5, cell] += dx * dy
+        sums[6, cell] += dy * dy
+        sums[7, cell] += dx * dz
+        sums[8, cell] += dy * dz
+        sums[9, cell] += dz * dz
+    return sums.reshape((10, shape[0], shape[1]))
+
+
+def _smoothest_plane(moments: NDArray[np.float64], width: int) -> _Floats:
+    """Return the least deviation from a plane among the windows of width x width cells that hold a cell."""
+    import cv2
+
+    before = (width - 1) // 2
+    for moment in moments:
+        cv2.boxFilter(
+            moment, -1, (width, width), moment, (before, before), normalize=False, borderType=cv2.BORDER_CONSTANT
+        )
+    after = width - 1 - before
+    rough = _plane_deviation(moments)
+    smoothest: _Floats = cv2.erode(rough, np.ones((width, width), np.uint8), anchor=(after, after))
+    return smoothest
 
 
 @njit(cache=True)
-def _roughness(moments, cell):  # type: ignore[no-untyped-def]
-    """Return the deviation from the least-squares plane of each 3 x 3 window; NaN where no plane is determined."""
-    rows, columns, _ = moments.shape
-    rough = np.full((rows, columns), np.nan, dtype=np.float32)
-    s = np.zeros(_MOMENTS)
+def _plane_deviation(moments):  # type: ignore[no-untyped-def]
+    """Return the standard deviation about the least-squares plane, `_NO_PLANE` where the points determine none."""
+    _, rows, columns = moments.shape
+    deviation = np.full((rows, columns), _NO_PLANE, dtype=np.float32)
     for row in range(rows):
         for column in range(columns):
-            s[:] = 0.0
-            for r in range(max(row - 1, 0), min(row + 2, rows)):
-                for c in range(max(column - 1, 0), min(column + 2, columns)):
-                    m = moments[r, c]
-                    if m[0] == 0:
-                        continue
-                    # Shift the origin from the cell's own centre to that of the window.
-                    dx, dy = (c - column) * cell, (row - r) * cell
-                    s[0] += m[0]
-                    s[1] += m[1] + m[0] * dx
-                    s[2] += m[2] + m[0] * dy
-                    s[3] += m[3]
-                    s[4] += m[4] + 2 * dx * m[1] + m[0] * dx * dx
-                    s[5] += m[5] + dx * m[2] + dy * m[1] + m[0] * dx * dy
-                    s[6] += m[6] + 2 * dy * m[2] + m[0] * dy * dy
-                    s[7] += m[7] + dx * m[3]
-                    s[8] += m[8] + dy * m[3]
-                    s[9] += m[9]
-            n = s[0]
+            n = round(moments[0, row, column])
             if n < _LEAST_POINTS:
                 continue
-            mx, my, mz = s[1] / n, s[2] / n, s[3] / n
-            xx, xy, yy = s[4] / n - mx * mx, s[5] / n - mx * my, s[6] / n - my * my
-            xz, yz, zz = s[7] / n - mx * mz, s[8] / n - my * mz, s[9] / n - mz * mz
+            mx, my, mz = moments[1, row, column] / n, moments[2, row, column] / n, moments[3, row, column] / n
+            xx = moments[4, row, column] / n - mx * mx
+            xy = moments[5, row, column] / n - mx * my
+            yy = moments[6, row, column] / n - my * my
+            xz = moments[7, row, column] / n - mx * mz
+            yz = moments[8, row, column] / n - my * mz
+            zz = moments[9, row, column] / n - mz * mz
             determinant = xx * yy - xy * xy
             # Points on one scan line, or on top of each other, determine no plane.
-            if determinant < 1e-3 * (0.5 * (xx + yy)) ** 2 or xx + yy < 0.01 * cell * cell:
+            if determinant < max(_FLATTEST * (0.5 * (xx + yy)) ** 2, 1e-8):
                 continue
             a = (xz * yy - yz * xy) / determinant
             b = (yz * xx - xz * xy) / determinant
-            rough[row, column] = np.sqrt(max(zz - a * xz - b * yz, 0.0) * n / (n - 3))
-    return rough
+            # Raised by its own standard error: the least of several windows must not be one of few points by luck.
+            sigma = np.sqrt(max(zz - a * xz - b * yz, 0.0) * n / (n - 3))
+            deviation[row, column] = sigma * (1 + 1 / np.sqrt(2.0 * (n - 3)))
+    return deviation

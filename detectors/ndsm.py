@@ -4,10 +4,11 @@
    surface filtered from the points.
 2. A cell is *high* where at least half of its points are above the height threshold.
 3. Each cue that the scene offers (multiple returns, roughness, penetration, image vegetation) says between -1 (roof)
-   and +1 (tree) how a cell looks; a high cell whose mean is negative is *roof*.
-4. Closing, filling of small holes and opening with a disc clean the mask; small regions go.
-5. The outline is traced to a fraction of a cell and given straight walls along its main directions, or replaced by its
-   minimum-area rectangle.
+   and +1 (tree) how a cell looks; the mean is averaged over the neighbourhood, and a high cell where it is negative is
+   *roof*.
+4. Small holes are filled, and an opening with a disc cuts off what is narrow.
+5. The outline is traced to a fraction of a cell, small or tree-like footprints go, and the rest gets straight walls
+   along its main directions, or is replaced by its minimum-area rectangle.
 
 Nothing is learned and nothing is random: the same points give the same footprints.
 """
@@ -30,7 +31,8 @@ from ..scenes.scene import Scene
 from .base import Detector
 from .cues import CellCues, cell_cues, greenness
 from .heights import ground_of, heights_above_ground
-from .outlines import coverage_of_mask, minimum_rectangles, regularise, trace
+from .outlines import coverage_of_mask, minimum_rectangles, trace
+from .regularise import regularise
 
 if TYPE_CHECKING:
     pass
@@ -65,11 +67,18 @@ class NDSM(Detector):
         0.5, minimum=0, maximum=1, doc="share of multiple returns from which on a cell looks like a tree; none: unused"
     )
     roughness: float | None = parameter(
-        0.3,
+        0.25,
         unit="m",
         minimum=0.01,
         maximum=5,
         doc="deviation from a local plane from which on a cell looks like a tree; none: unused",
+    )
+    window: float = parameter(
+        1.5,
+        unit="m",
+        minimum=0.2,
+        maximum=20,
+        doc="width of the windows in which planes are fitted, at least two cells",
     )
     penetration: float | None = parameter(
         0.35,
@@ -86,7 +95,9 @@ class NDSM(Detector):
     darkest: float = parameter(
         0.1, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel say nothing: shadow"
     )
-    closing: float = parameter(0.5, unit="m", minimum=0, maximum=10, doc="radius of the closing")
+    smoothing: float = parameter(
+        0.5, unit="m", minimum=0, maximum=5, doc="sigma of the Gaussian over which the likeness to a tree is averaged"
+    )
     opening: float = parameter(
         1.0, unit="m", minimum=0, maximum=10, doc="radius of the opening: narrower parts are cut off"
     )
@@ -101,7 +112,11 @@ class NDSM(Detector):
         doc="traced polygon with straight walls, or rectangle of least area around it",
     )
     tolerance: float | None = parameter(
-        None, unit="m", minimum=0, maximum=5, doc="how far traced points may lie beside a wall; none: one cell"
+        None,
+        unit="m",
+        minimum=0,
+        maximum=5,
+        doc="how far traced points may lie beside a wall; none: one cell, at least 0.5 m",
     )
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
@@ -114,9 +129,10 @@ class NDSM(Detector):
         assert points is not None
         heights = heights_above_ground(points, ground_of(scene, use_dem=self.dem))
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
-        cues = cell_cues(points, heights, grid, threshold=self.height)
-        likeness = self._tree_likeness(cues, self._vegetation(scene, grid))
+        cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
         high = np.nan_to_num(cues.high_share) >= 0.5
+        likeness = self._tree_likeness(cues, self._vegetation(scene, grid))
+        likeness = _averaged(likeness, high, self.smoothing / grid.gsd)
         roof = high & ((likeness < 0) | np.isnan(likeness))
         mask = self._clean(roof, grid.gsd)
         share = np.where(likeness > 0, np.float32(0), cues.high_share)
@@ -160,10 +176,10 @@ class NDSM(Detector):
         return np.where(count > 0, total / np.maximum(count, 1), np.float32(np.nan))
 
     def _clean(self, roof: _Mask, cell: float) -> _Mask:
-        """Close, fill small holes and open."""
+        """Fill small holes and open."""
         import cv2
 
-        mask = cv2.morphologyEx(roof.astype(np.uint8), cv2.MORPH_CLOSE, _disc(self.closing / cell))
+        mask = roof.astype(np.uint8)
         _, labels, statistics, _ = cv2.connectedComponentsWithStats(1 - mask, connectivity=4)
         small = statistics[:, cv2.CC_STAT_AREA] * cell**2 <= self.largest_hole
         small[0] = False
@@ -174,16 +190,14 @@ class NDSM(Detector):
     def _footprints(
         self, traced: NDArray[np.object_], cues: CellCues, likeness: _Floats, crs: str | None
     ) -> Footprints:
-        inside = [_cells_inside(polygon, cues.grid) for polygon in traced]
-        looks = np.array([_mean(likeness, cells) for cells in inside])
+        height, looks = _means_inside(traced, cues.grid, cues.height, likeness)
         # Where no cue says anything the mean is NaN, and the footprint stays.
         keep = ~(looks > self.most_tree_like) & (shapely.area(traced) >= self.smallest_area)
         if self.outline == "rectangle":
             polygons = minimum_rectangles(traced[keep])
         else:
-            tolerance = cues.grid.gsd if self.tolerance is None else self.tolerance
+            tolerance = max(cues.grid.gsd, 0.5) if self.tolerance is None else self.tolerance
             polygons = regularise(traced[keep], tolerance)
-        height = np.array([_mean(cues.height, cells) for cells in inside])
         attributes = {"height": height[keep], "tree_likeness": looks[keep]}
         return Footprints.of(polygons, crs=crs, attributes=attributes, source=self.name)
 
@@ -215,9 +229,21 @@ def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple
     return min(max(round(1.4 * spacing / 0.05) * 0.05, 0.25), 2.0)
 
 
+def _averaged(likeness: _Floats, high: _Mask, sigma: float) -> _Floats:
+    """Return the Gaussian mean over high cells, unchanged in others; `sigma` in cells."""
+    import cv2
+
+    told = high & np.isfinite(likeness)
+    if sigma <= 0 or not told.any():
+        return likeness
+    total = cv2.GaussianBlur(np.where(told, likeness, np.float32(0)), (0, 0), sigma)
+    weight = cv2.GaussianBlur(told.astype(np.float32), (0, 0), sigma)
+    return np.where(told, total / np.where(told, weight, 1), likeness)
+
+
 def _disc(radius: float) -> NDArray[np.uint8]:
-    """Return a disc of a radius in cells; a single cell below half a cell."""
-    reach = int(radius + 0.5)
+    """Return a disc of a radius in cells; a single cell below three quarters."""
+    reach = int(radius + 0.25)
     row, column = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     disc: NDArray[np.uint8] = (row**2 + column**2 <= max(radius, reach) ** 2 + 0.5).astype(np.uint8)
     return disc
@@ -243,18 +269,19 @@ def _with_corners(opened: NDArray[np.uint8], mask: NDArray[np.uint8], radius: fl
     return np.asarray((opened > 0) | (restored & apart))
 
 
-def _cells_inside(polygon: object, grid: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return rows and columns of the cells whose centres lie in a polygon."""
-    xmin, ymin, xmax, ymax = shapely.bounds(polygon)
-    rows, columns = grid.to_pixel([xmin, xmax], [ymax, ymin])
-    first_row, last_row = max(int(rows[0]), 0), min(int(rows[1]) + 1, grid.rows)
-    first_column, last_column = max(int(columns[0]), 0), min(int(columns[1]) + 1, grid.columns)
-    row, column = np.mgrid[first_row:last_row, first_column:last_column]
-    inside = shapely.contains_xy(polygon, *grid.to_world(row + 0.5, column + 0.5))
-    return row[inside], column[inside]
+def _means_inside(polygons: NDArray[np.object_], grid: Grid, *rasters: _Floats) -> list[NDArray[np.float64]]:
+    """Return per raster the mean of its known cells inside each polygon; NaN where none is known."""
+    from rasterio.features import rasterize
+    from rasterio.transform import Affine
 
-
-def _mean(values: _Floats, cells: tuple[NDArray[np.intp], NDArray[np.intp]]) -> float:
-    chosen = values[cells]
-    chosen = chosen[np.isfinite(chosen)]
-    return float(chosen.mean()) if len(chosen) else math.nan
+    if len(polygons) == 0:
+        return [np.empty(0) for _ in rasters]
+    shapes = ((polygon, number) for number, polygon in enumerate(polygons, start=1))
+    owner = rasterize(shapes, out_shape=grid.shape, transform=Affine(*grid.transform), dtype=np.int32)
+    means = []
+    for raster in rasters:
+        known = np.isfinite(raster) & (owner > 0)
+        count = np.bincount(owner[known], minlength=len(polygons) + 1)[1:]
+        total = np.bincount(owner[known], weights=raster[known], minlength=len(polygons) + 1)[1:]
+        means.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    return means

@@ -1,0 +1,244 @@
+"""Regularise: give traced outlines straight walls and right angles.
+
+Nouns
+-----
+wall
+    A straight part of an outline between two corners: a line fitted to the traced points there. A ring's walls are an
+    array of shape (n, 4): centre x and y in metres, direction in radians, length in metres; in order round the ring.
+main directions
+    The few directions, modulo 90 degrees, that most of an outline's length follows.
+
+Coordinates are metres, x east and y north; angles are counted from x towards y.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from .outlines import simplify
+
+__all__ = ["regularise"]
+
+_Points = NDArray[np.float64]
+
+#: Walls within so many degrees follow the same direction; the share of the length that makes it a main one; how many.
+_SAME_DIRECTION, _MAIN_SHARE, _MOST_DIRECTIONS = 5.0, 0.15, 4
+#: Neighbouring walls that differ by less (radians) run the same way; by less than the second, meet nowhere near.
+_PARALLEL, _GRAZING = math.radians(2), math.radians(10)
+
+
+def regularise(
+    polygons: NDArray[np.object_], tolerance: float, *, angle: float = 15.0, least_agreement: float = 0.85
+) -> NDArray[np.object_]:
+    """Return the polygons with walls along their main directions and right angles between them.
+
+    Each polygon is simplified; its walls are fitted to the traced points between the corners; those within `angle`
+    of a main direction turn into it, and so do walls so short that their direction is noise; neighbouring walls that
+    are parallel become one, or are joined by a step; corners are where neighbouring walls meet. A polygon that comes
+    out invalid, or agrees less than `least_agreement` (intersection over union) with what was traced, is only
+    simplified.
+
+    Parameters
+    ----------
+    polygons : ndarray of Polygon, shape (n,)
+        As traced, with all their vertices.
+    tolerance : float
+        Metres by which traced points may lie beside a wall.
+    angle : float
+        Degrees.
+    least_agreement : float
+        0..1.
+    """
+    simple = simplify(polygons, tolerance)
+    result = simple.copy()
+    for number, (traced, plain) in enumerate(zip(polygons, simple, strict=True)):
+        regular = _regular(traced, plain, tolerance, math.radians(angle))
+        if regular is None or not regular.is_valid:
+            continue
+        common = regular.intersection(traced).area
+        if common >= least_agreement * (regular.area + traced.area - common):
+            result[number] = regular
+    return result
+
+
+def _regular(traced: Any, simple: Any, tolerance: float, angle: float) -> Any | None:
+    """Return one regularised polygon, or None when its shell does not work out."""
+    origin = np.array(traced.bounds[:2])
+    sources = [shapely.get_coordinates(ring)[:-1] - origin for ring in (traced.exterior, *traced.interiors)]
+    rings = []
+    for ring in (simple.exterior, *simple.interiors):
+        walls = _fit_walls(shapely.get_coordinates(ring)[:-1] - origin, sources)
+        if walls is None:
+            return None
+        rings.append(walls)
+    mains = _main_directions(np.concatenate(rings))
+    outlines = []
+    for walls in rings:
+        merged = _merged(_turned(walls, mains, tolerance, angle), tolerance)
+        outlines.append(_corners(_merged(_without_jogs(merged, tolerance), tolerance), tolerance))
+    if len(outlines[0]) < 3:
+        return None
+    return shapely.Polygon(outlines[0] + origin, [hole + origin for hole in outlines[1:] if len(hole) >= 3])
+
+
+def _fit_walls(corners: _Points, sources: list[_Points]) -> _Points | None:
+    """Return the walls between the corners, fitted to the traced ring that the corners are points of.
+
+    The lines are total least squares, each traced step counting by its length; a wall of few steps joins its corners.
+    None when no ring holds all corners.
+    """
+    for ring in sources:
+        position = _positions(corners, ring)
+        if position is not None:
+            break
+    else:
+        return None
+    if (np.diff(position, append=position[0]) % len(ring)).sum() != len(ring):
+        # The simplified ring runs the other way round.
+        ring = ring[::-1]
+        position = len(ring) - 1 - position
+    # Start at a corner, so that every wall is one run of steps.
+    ring = np.roll(ring, -position[0], axis=0)
+    start = (position - position[0]) % len(ring)
+    step = np.roll(ring, -1, axis=0) - ring
+    length = np.hypot(step[:, 0], step[:, 1])
+    middle = ring + step / 2
+    total = np.maximum(np.add.reduceat(length, start), 1e-12)
+    centre = np.add.reduceat(middle * length[:, None], start) / total[:, None]
+    wall = np.repeat(np.arange(len(start)), np.diff([*start, len(ring)]))
+    x, y = (middle - centre[wall]).T
+    xx, xy, yy = (np.add.reduceat(length * product, start) for product in (x * x, x * y, y * y))
+    across = np.roll(corners, -1, axis=0) - corners
+    chord = np.arctan2(across[:, 1], across[:, 0])
+    fitted = np.arctan2(2 * xy, xx - yy) / 2
+    fitted += np.pi * np.round((chord - fitted) / np.pi)
+    few = np.bincount(wall) < 4
+    direction = np.where(few, chord, fitted)
+    centre[few] = (corners + across / 2)[few]
+    return np.column_stack([centre, direction, np.hypot(across[:, 0], across[:, 1])])
+
+
+def _positions(corners: _Points, ring: _Points) -> NDArray[np.intp] | None:
+    """Return at which points of a ring the corners are, or None unless all are there."""
+    ring_keys, keys = ring[:, 0] + 1j * ring[:, 1], corners[:, 0] + 1j * corners[:, 1]
+    order = np.argsort(ring_keys)
+    found = order[np.searchsorted(ring_keys[order], keys).clip(max=len(ring) - 1)]
+    return found if np.array_equal(ring_keys[found], keys) else None
+
+
+def _main_directions(walls: _Points) -> _Points:
+    """Return the main directions, radians in 0..pi/2, most followed first."""
+    degrees = np.degrees(walls[:, 2]) % 90
+    # Long walls tell directions better than short ones of the same length in all.
+    remaining = walls[:, 3] ** 1.5
+    least = _MAIN_SHARE * remaining.sum()
+    away = (degrees[:, None] - degrees[None, :] + 45) % 90 - 45
+    near = np.abs(away) < _SAME_DIRECTION
+    mains: list[float] = []
+    while len(mains) < _MOST_DIRECTIONS:
+        support = (near * remaining[:, None]).sum(axis=0)
+        best = int(np.argmax(support))
+        if support[best] <= 0 or support[best] < least:
+            break
+        followers = near[:, best]
+        mains.append(degrees[best] + np.average(away[followers, best], weights=remaining[followers]))
+        remaining[np.abs(away[:, best]) < 2 * _SAME_DIRECTION] = 0
+    return np.radians(mains) % (math.pi / 2)
+
+
+def _turned(walls: _Points, mains: _Points, tolerance: float, angle: float) -> _Points:
+    """Return the walls with those near a main direction turned into it."""
+    if len(mains) == 0:
+        return walls
+    quarter = math.pi / 2
+    turn = (mains[None, :] - walls[:, 2:3] + quarter / 2) % quarter - quarter / 2
+    nearest = turn[np.arange(len(walls)), np.argmin(np.abs(turn), axis=1)]
+    # A wall of length l whose ends are known to the tolerance has a direction known to about 2 tolerance / l.
+    allowed = np.maximum(angle, np.arctan2(2 * tolerance, walls[:, 3]))
+    turned = walls.copy()
+    turned[:, 2] += np.where(np.abs(nearest) <= allowed, nearest, 0)
+    return turned
+
+
+def _merged(walls: _Points | list[_Points], tolerance: float) -> list[_Points]:
+    """Return the walls with neighbours joined that run the same way, less than the tolerance apart."""
+    merged: list[_Points] = []
+    for wall in walls:
+        merged.append(wall)
+        while len(merged) > 1 and _continues(merged[-2], merged[-1], tolerance):
+            merged[-2:] = [_joined(merged[-2], merged[-1])]
+    # The first wall may continue the last: where a ring starts is no corner.
+    while len(merged) > 1 and _continues(merged[-1], merged[0], tolerance):
+        merged[0] = _joined(merged.pop(), merged[0])
+    return merged
+
+
+def _continues(one: _Points, two: _Points, tolerance: float) -> bool:
+    turn = (two[2] - one[2] + math.pi) % (2 * math.pi) - math.pi
+    apart = abs(math.cos(one[2]) * (two[1] - one[1]) - math.sin(one[2]) * (two[0] - one[0]))
+    return bool(abs(turn) < _PARALLEL and apart < tolerance)
+
+
+def _joined(one: _Points, two: _Points) -> _Points:
+    length = one[3] + two[3]
+    centre = (one[:2] * one[3] + two[:2] * two[3]) / max(length, 1e-12)
+    return np.array([*centre, (one if one[3] >= two[3] else two)[2], length])
+
+
+def _without_jogs(walls: list[_Points], tolerance: float) -> list[_Points]:
+    """Return the walls without the short ones that only cut a corner, or shift a wall by less than the tolerance."""
+    kept = list(walls)
+    position = 0
+    while position < len(kept) and len(kept) > 3:
+        wall, before, after = kept[position], kept[position - 1], kept[(position + 1) % len(kept)]
+        if wall[3] < 6 * tolerance and _close_up(before, after, wall, tolerance):
+            del kept[position]
+        else:
+            position += 1
+    return kept
+
+
+def _close_up(before: _Points, after: _Points, wall: _Points, tolerance: float) -> bool:
+    """Return whether the neighbours of a wall run on in each other, or meet beside it close to its line."""
+    meeting = _meeting(before, after)
+    if meeting is None:
+        return _continues(before, after, tolerance)
+    aside, along = meeting - wall[:2], _along(wall)
+    across = abs(along[0] * aside[1] - along[1] * aside[0])
+    return bool(across < 2.5 * tolerance and abs(along @ aside) < wall[3] / 2 + tolerance)
+
+
+def _meeting(one: _Points, two: _Points) -> _Points | None:
+    """Return where the lines of two walls meet; None when they are nearly parallel."""
+    along, onward = _along(one), _along(two)
+    cross = along[0] * onward[1] - along[1] * onward[0]
+    if abs(cross) < math.sin(_GRAZING):
+        return None
+    gap = two[:2] - one[:2]
+    meeting: _Points = one[:2] + along * (gap[0] * onward[1] - gap[1] * onward[0]) / cross
+    return meeting
+
+
+def _along(wall: _Points) -> _Points:
+    return np.array([math.cos(wall[2]), math.sin(wall[2])])
+
+
+def _corners(walls: list[_Points], tolerance: float) -> _Points:
+    """Return the corners of a ring, shape (n, 2): where neighbouring walls meet, or the two ends of a step."""
+    corners: list[_Points] = []
+    for wall, following in zip(walls, [*walls[1:], *walls[:1]], strict=True):
+        along, onward = _along(wall), _along(following)
+        between = (wall[:2] + along * wall[3] / 2 + following[:2] - onward * following[3] / 2) / 2
+        meeting = _meeting(wall, following)
+        if meeting is not None and math.hypot(*(meeting - between)) < 4 * tolerance:
+            corners.append(meeting)
+        else:
+            # Parallel walls, or such that meet far off, are joined by a step between them.
+            corners.append(wall[:2] + along * ((between - wall[:2]) @ along))
+            corners.append(following[:2] + onward * ((between - following[:2]) @ onward))
+    return np.array(corners)
