@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .scenes.points import PointCloud
     from .scenes.raster import Elevation, Grid, Image
     from .scenes.scene import Scene
+    from .scenes.synthetic import make_scene
     from .scenes.vector_files import read_footprints, write_footprints
 
 #: Public name to the module that defines it.
@@ -47,6 +48,7 @@ _HOMES = {
     "evaluate": "evaluators.comparison",
     "make_detector": "detectors.registry",
     "make_evaluator": "evaluators.registry",
+    "make_scene": "scenes.synthetic",
     "open_scene": "scenes.folder",
     "parameter": "scenes.parameters",
     "pool": "evaluators.comparison",
@@ -73,6 +75,7 @@ __all__ = [
     "evaluate",
     "make_detector",
     "make_evaluator",
+    "make_scene",
     "open_scene",
     "parameter",
     "pool",

@@ -204,7 +204,8 @@ def make_preset(preset: str, seed: int, parameters: Mapping[str, Any]) -> Scene:
 
 def preset_names() -> list[str]:
     """Return the names of the scenes that can be generated."""
-    return ["hamlet"]
+    generated: list[str] = importlib.import_module(f"{_ROOT}.{_GENERATOR}").preset_names()
+    return ["hamlet", *generated]
 
 
 def code_digest(plugin: Detector | Evaluator) -> str:

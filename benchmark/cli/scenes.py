@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from ...scenes.errors import InputError
+from . import scenes_make
 
 __all__ = ["app"]
 
@@ -22,6 +23,9 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+
+app.command("make")(scenes_make.make)
+app.command("list")(scenes_make.list_)
 
 _POINT_ENDINGS = (".las", ".laz")
 _IMAGE_ENDINGS = (".tif", ".tiff", ".vrt", ".jp2", ".png", ".jpg", ".jpeg", ".img")

@@ -1,0 +1,132 @@
+"""Ground cover: streets, footpaths, verges, lawns and the patches of gardens and yards, as codes on a raster.
+
+Codes below 16 are rows of `palettes.GROUND` (see `clutter.Cover`); codes from 64 are grass, and their lower six bits
+tell how dry it is: every parcel has its own gardener.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..raster import Grid
+from .clutter import Cover
+from .layout import HALLS, TOWERS, locate
+from .streams import uniform
+from .world import World, ground_at
+
+__all__ = ["GRASS", "cover_codes"]
+
+GRASS = 64
+_PARK = 3
+_ASPHALT, _FOOTPATH, _EARTH, _PLAZA = map(int, (Cover.ASPHALT, Cover.FOOTPATH, Cover.EARTH, Cover.PLAZA))
+
+
+def cover_codes(world: World, grid: Grid) -> NDArray[np.uint8]:
+    """Return the ground cover on a grid in local coordinates, shape (rows, columns)."""
+    layout = world.layout
+    raster = layout.u.grid
+    codes = np.empty(grid.shape, dtype=np.uint8)
+    _streets(
+        codes,
+        (grid.west, grid.north, grid.gsd),
+        layout.u.values,
+        layout.v.values,
+        (raster.west, raster.north, raster.gsd),
+        layout.pattern,
+        layout.key,
+        layout.zones,
+        np.array(layout.first),
+        world.recipe.dryness,
+    )
+    _patches(codes, (grid.west, grid.north, grid.gsd), world.patches)
+    return codes
+
+
+@njit(cache=True)
+def _streets(
+    codes: NDArray[np.uint8],
+    frame: tuple[float, float, float],
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+    raster: tuple[float, float, float],
+    pattern: NDArray[np.float64],
+    key: int,
+    zones: NDArray[np.uint8],
+    first: NDArray[np.int64],
+    dryness: float,
+) -> None:
+    west, north, gsd = frame
+    period, length, street, cross = pattern[0], pattern[1], pattern[2], pattern[3]
+    for r in range(codes.shape[0]):
+        y = north - (r + 0.5) * gsd
+        for c in range(codes.shape[1]):
+            x = west + (c + 0.5) * gsd
+            pu = ground_at(u, raster[0], raster[1], raster[2], x, y)
+            pv = ground_at(v, raster[0], raster[1], raster[2], x, y)
+            block, row, along, across = locate(pu, pv, pattern, key)
+            i = min(max(block - first[0], 0), zones.shape[0] - 1)
+            j = min(max(row - first[1], 0), zones.shape[1] - 1)
+            zone = zones[i, j]
+            main = street / 2 - min(across, period - across)  # depth into the street, negative on parcels
+            side = cross / 2 - min(along, length - along)
+            if main > 0 or side > 0:
+                codes[r, c] = _street_code(main, street, side, cross, zone)
+            else:
+                codes[r, c] = _parcel_code(block, row, along, across, pattern, key, zone, dryness)
+
+
+@njit(cache=True)
+def _street_code(main: float, street: float, side: float, cross: float, zone: int) -> int:
+    """Cross section from the parcel front: footpath, verge, carriageway; downtown has wide pavements instead."""
+    pavement = 4.0 if zone == TOWERS else 3.4
+    road = main > min(pavement, street * 0.28) or side > min(pavement, cross * 0.28)
+    if road:
+        return _ASPHALT
+    depth = max(main, side)
+    if zone == TOWERS or depth < 0.2 or (0.5 < depth < 1.7):
+        return _FOOTPATH if zone != TOWERS else _PLAZA
+    return GRASS + 22
+
+
+@njit(cache=True)
+def _parcel_code(
+    block: int, row: int, along: float, across: float, pattern: NDArray[np.float64], key: int, zone: int, dryness: float
+) -> int:
+    """Grass of a parcel, drier on some; earth on a few."""
+    usable = pattern[1] - pattern[3]
+    wide = pattern[7] * (3.2 if zone == HALLS else 1.0)
+    count = max(1, round(usable / wide))
+    lot = int((along - pattern[3] / 2) / usable * count)
+    half = 0 if across < pattern[0] / 2 or zone == HALLS else 1
+    if zone == _PARK:
+        lot, half = 0, 0
+    counter = ((block & 0xFFFF) << 32) | ((row & 0xFFFF) << 16) | ((lot & 0xFF) << 1) | half
+    draw, bare = uniform(key, counter), uniform(key, counter + (1 << 60))
+    if bare < 0.05 and zone != _PARK:
+        return _EARTH
+    dry = min(max(dryness + (draw - 0.5) * 0.9, 0.0), 1.0)
+    return GRASS + int(dry * 63)
+
+
+@njit(cache=True)
+def _patches(codes: NDArray[np.uint8], frame: tuple[float, float, float], patches: NDArray[np.float64]) -> None:
+    west, north, gsd = frame
+    for k in range(len(patches)):
+        x0, y0, angle, length, width, code = patches[k]
+        cosine, sine = math.cos(angle), math.sin(angle)
+        reach_x = (abs(cosine) * length + abs(sine) * width) / 2
+        reach_y = (abs(sine) * length + abs(cosine) * width) / 2
+        for r in range(
+            max(0, int((north - y0 - reach_y) / gsd)), min(codes.shape[0], int((north - y0 + reach_y) / gsd) + 1)
+        ):
+            dy = north - (r + 0.5) * gsd - y0
+            for c in range(
+                max(0, int((x0 - reach_x - west) / gsd)), min(codes.shape[1], int((x0 + reach_x - west) / gsd) + 1)
+            ):
+                dx = west + (c + 0.5) * gsd - x0
+                if abs(cosine * dx + sine * dy) <= length / 2 and abs(cosine * dy - sine * dx) <= width / 2:
+                    codes[r, c] = int(code)

@@ -1,0 +1,441 @@
+"""The laser scanner: pulses in scan lines, cut with solids and crowns, and what comes back.
+
+Nouns
+-----
+strip
+    What one flight line sees; neighbouring strips overlap, so the point density differs from place to place.
+pulse
+    A ray through a place on the bare earth, tilted towards the flight line: seen from there, walls facing the aircraft
+    return points, and the ground behind a building none.
+footprint
+    A pulse is some decimetres wide: at an edge, part of it hits the roof and the rest the ground.
+
+In a crown a pulse loses energy with the length of its way through leaves (Beer-Lambert): the optical depth until the
+next return is exponentially distributed. Returns closer than the receiver's dead zone are one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..points import PointCloud
+from ..raster import Grid
+from .clutter import Cover
+from .groundcover import cover_codes
+from .palettes import GROUND, LAWNS
+from .recipe import SceneParameters
+from .solids import Body
+from .streams import counter_key, gauss, stream, uniform
+from .world import CellIndex, World, ground_at
+
+__all__ = ["scan"]
+
+_FLYING_HEIGHT = 900.0
+_OVERLAP = 0.12
+_FOOTPRINT = 0.22
+_DEAD_ZONE = 1.0
+_MOST = 5
+_MODES = {"first": 0, "last": 1, "all": 2}
+_CHUNK = 250_000
+_POOL = int(Cover.POOL)
+_BUILDING, _FURNITURE, _HEDGE = int(Body.BUILDING), int(Body.FURNITURE), int(Body.HEDGE)
+#: First extinction (to the first return) and later extinction, per metre of leaves.
+_DENSE, _LOOSE = 1.1, 0.42
+
+
+def scan(world: World, origin: tuple[float, float]) -> PointCloud:
+    """Return the point cloud of a world in world coordinates, rounded to centimetres."""
+    recipe = world.recipe
+    places = _pulses(recipe, world.seed)
+    solids, trees = world.solids, world.trees
+    solid_index, blob_index = CellIndex.of_solids(world), CellIndex.of_blobs(world)
+    cover_grid = Grid.covering((0, 0, recipe.width, recipe.height), 0.5)
+    codes = cover_codes(world, cover_grid)
+    terrain = world.terrain
+    ground_nir = np.zeros(256)
+    ground_nir[: len(GROUND)] = GROUND[:, 3]
+    ground_nir[64:128] = LAWNS[0, 3] + (LAWNS[1, 3] - LAWNS[0, 3]) * np.arange(64) / 63
+    pieces = []
+    for start in range(0, len(places), _CHUNK):
+        pieces.append(
+            _scan_chunk(
+                places[start : start + _CHUNK],
+                start,
+                terrain.values,
+                (terrain.grid.west, terrain.grid.north, terrain.grid.gsd),
+                codes,
+                (cover_grid.west, cover_grid.north, cover_grid.gsd),
+                ground_nir,
+                (solid_index.columns, solid_index.rows),
+                solid_index.arrays,
+                blob_index.arrays,
+                solids.planes,
+                solids.body,
+                np.ascontiguousarray(solids.colour[:, 3]),
+                np.ascontiguousarray(solids.wall[:, 3]),
+                trees.blobs,
+                trees.tree,
+                np.ascontiguousarray(trees.colour[:, 3]),
+                (recipe.width, recipe.height),
+                (recipe.vertical_noise, recipe.horizontal_noise, recipe.dropouts),
+                _MODES[recipe.pulse],
+                counter_key(world.seed, "lidar"),
+            )
+        )
+    xyz, returns, intensity, classes = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    known = recipe.pulse == "all"
+    return PointCloud(
+        x=np.round((xyz[:, 0] + origin[0]) * 100) / 100,
+        y=np.round((xyz[:, 1] + origin[1]) * 100) / 100,
+        z=np.round(xyz[:, 2] * 100) / 100,
+        return_number=np.ascontiguousarray(returns[:, 0]) if known else None,
+        number_of_returns=np.ascontiguousarray(returns[:, 1]) if known else None,
+        intensity=intensity,
+        classification=classes,
+    )
+
+
+def _pulses(recipe: SceneParameters, seed: int) -> NDArray[np.float64]:
+    """Return x, y on the ground and the tilt (metres towards the aircraft per metre of height), shape (n, 4)."""
+    rng = stream(seed, "lidar")
+    heading, phase = rng.random() * math.pi, rng.random(2)
+    cosine, sine = math.cos(heading), math.sin(heading)
+    half = max(_FLYING_HEIGHT * math.tan(math.radians(recipe.scan_angle)), 60.0)
+    between = 2 * half * (1 - _OVERLAP)
+    spacing = recipe.point_spacing * math.sqrt(_strips_over(recipe, (cosine, sine), half, between, phase[0]))
+    centre = (recipe.width / 2, recipe.height / 2)
+    reach = math.hypot(recipe.width, recipe.height) / 2
+    strips = []
+    first = math.floor((-reach - half) / between + phase[0])
+    last = math.ceil((reach + half) / between + phase[0])
+    for number in range(first, last + 1):
+        middle = (number - phase[0]) * between
+        low, high = max(middle - half, -reach), min(middle + half, reach)
+        if high <= low:
+            continue
+        strips.append(
+            _strip(
+                (low, high, middle, half, reach),
+                (spacing, phase[1], math.tan(math.radians(recipe.scan_angle))),
+                (cosine, sine, *centre),
+                (recipe.width, recipe.height),
+                counter_key(seed, "lidar") ^ np.uint64(number & 0xFFFF),
+            )
+        )
+    return np.concatenate(strips)
+
+
+def _strips_over(
+    recipe: SceneParameters, heading: tuple[float, float], half: float, between: float, phase: float
+) -> float:
+    """Return by how many strips a place in the extent is seen, on average."""
+    x, y = ((np.arange(80) + 0.5) / 80 - 0.5) * recipe.width, ((np.arange(80) + 0.5) / 80 - 0.5) * recipe.height
+    q = heading[0] * y[:, None] - heading[1] * x[None, :]
+    number = q / between + phase
+    offset = np.abs(number - np.round(number)) * between
+    # The nearest strip always sees the place; the second nearest does within its half width.
+    return float((1.0 + (between - offset < half)).mean())
+
+
+@njit(cache=True)
+def _strip(
+    span: tuple[float, float, float, float, float],
+    rhythm: tuple[float, float, float],
+    frame: tuple[float, float, float, float],
+    extent: tuple[float, float],
+    key: int,
+) -> NDArray[np.float64]:
+    """Return the pulses of one strip: lines across the flight, a little uneven as mirror and aircraft are."""
+    low, high, middle, half, reach = span
+    spacing, phase, tangent = rhythm
+    cosine, sine, cx, cy = frame
+    # The mirror is a little slower at the ends of its swing; lines are somewhat wider apart than pulses on a line.
+    along_step, across_step = spacing * 1.12, spacing / 1.12
+    lines, dots = int(2 * reach / along_step) + 2, int((high - low) / across_step) + 2
+    out = np.empty((lines * dots, 4))
+    count = 0
+    for i in range(lines):
+        drift = 0.35 * math.sin(i * 0.013 + 6.0 * phase) + 0.12 * gauss(key, i)
+        for k in range(dots):
+            counter = (i * dots + k) * 2 + (1 << 40)
+            q = low + (k + 0.5 * (i & 1) + phase + 0.16 * gauss(key, counter)) * across_step
+            p = -reach + (i + drift + 0.10 * gauss(key, counter + 1)) * along_step
+            if q >= high:
+                continue
+            x, y = cx + cosine * p - sine * q, cy + sine * p + cosine * q
+            if x < 0 or y < 0 or x >= extent[0] or y >= extent[1]:
+                continue
+            tilt = -tangent * (q - middle) / half
+            out[count, 0], out[count, 1], out[count, 2], out[count, 3] = x, y, -sine * tilt, cosine * tilt
+            count += 1
+    return out[:count].copy()
+
+
+@njit(cache=True)
+def _solid_top(
+    x: float,
+    y: float,
+    ground: float,
+    tx: float,
+    ty: float,
+    size: tuple[int, int],
+    cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
+    planes: NDArray[np.float64],
+) -> tuple[float, int, int]:
+    """Return the height above ground at which a pulse meets the first solid, the solid (-1: none), and its face."""
+    start, items, top, highest = cells
+    best, hit, where = 0.0, -1, 0
+    lean = max(abs(tx), abs(ty))
+    height, previous = 0.0, -1
+    while True:
+        i, j = int((x + tx * height) // 4.0), int((y + ty * height) // 4.0)
+        if i < 0 or j < 0 or i >= size[0] or j >= size[1]:
+            break
+        cell = j * size[0] + i
+        if cell != previous and top[cell] > ground + best:
+            for n in range(start[cell], start[cell + 1]):
+                k = items[n]
+                low, high, face = 0.0, 1e9, -1
+                for f in range(8):
+                    a = planes[k, f, 0] * x + planes[k, f, 1] * y + planes[k, f, 2] * ground
+                    b = planes[k, f, 0] * tx + planes[k, f, 1] * ty + planes[k, f, 2]
+                    room = planes[k, f, 3] - a
+                    if b > 1e-12:
+                        if room < high * b:
+                            high, face = room / b, f
+                    elif b < -1e-12:
+                        low = max(low, room / b)
+                    elif room < 0:
+                        high = -1.0
+                    if high <= low:
+                        break
+                if high > low and high > best:
+                    best, hit, where = high, k, face
+        previous = cell
+        # Go on along the path for as long as something as tall may stand there.
+        height += 2.0 / max(lean, 1e-6)
+        if ground + height > highest:
+            break
+    return best, hit, where
+
+
+@njit(cache=True)
+def _leaf_hits(
+    x: float,
+    y: float,
+    ground: float,
+    tx: float,
+    ty: float,
+    floor: float,
+    size: tuple[int, int],
+    cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
+    blobs: NDArray[np.float64],
+    found: NDArray[np.float64],
+) -> int:
+    """Collect the ways through blobs above `floor` (heights above ground: entry, exit, blob); return how many."""
+    start, items, top, highest = cells
+    count, height, previous = 0, 0.0, -1
+    lean = max(abs(tx), abs(ty), 1e-6)
+    while ground + height <= highest:
+        i, j = int((x + tx * height) // 4.0), int((y + ty * height) // 4.0)
+        if i < 0 or j < 0 or i >= size[0] or j >= size[1]:
+            break
+        cell = j * size[0] + i
+        if cell != previous and top[cell] > ground + floor:
+            for n in range(start[cell], start[cell + 1]):
+                k = items[n]
+                dx, dy, dz = x - blobs[k, 0], y - blobs[k, 1], ground - blobs[k, 2]
+                across, up = blobs[k, 3] * blobs[k, 3], blobs[k, 4] * blobs[k, 4]
+                a = (tx * tx + ty * ty) / across + 1.0 / up
+                b = (tx * dx + ty * dy) / across + dz / up
+                c = (dx * dx + dy * dy) / across + dz * dz / up - 1.0
+                root = b * b - a * c
+                if root <= 0 or count == len(found):
+                    continue
+                root = math.sqrt(root)
+                enter, leave = (-b + root) / a, (-b - root) / a
+                if enter <= floor:
+                    continue
+                known = False
+                for m in range(count):
+                    known = known or found[m, 2] == k
+                if not known:
+                    # Keep them sorted by entry, the highest first.
+                    m = count
+                    while m > 0 and found[m - 1, 0] < enter:
+                        found[m] = found[m - 1]
+                        m -= 1
+                    found[m, 0], found[m, 1], found[m, 2] = enter, max(leave, floor), k
+                    count += 1
+        previous = cell
+        height += 2.0 / lean
+    return count
+
+
+@njit(cache=True)
+def _scan_chunk(
+    places: NDArray[np.float64],
+    number: int,
+    terrain: NDArray[np.float32],
+    raster: tuple[float, float, float],
+    codes: NDArray[np.uint8],
+    cover: tuple[float, float, float],
+    ground_nir: NDArray[np.float64],
+    size: tuple[int, int],
+    solid_cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
+    blob_cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
+    planes: NDArray[np.float64],
+    body: NDArray[np.uint8],
+    roof_nir: NDArray[np.float32],
+    wall_nir: NDArray[np.float32],
+    blobs: NDArray[np.float64],
+    tree: NDArray[np.int32],
+    leaf_nir: NDArray[np.float32],
+    extent: tuple[float, float],
+    noise: tuple[float, float, float],
+    mode: int,
+    key: int,
+) -> tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint8]]:
+    """Send pulses; returns coordinates, (return number, number of returns), intensities, ASPRS classes."""
+    room = len(places) * (_MOST if mode == 2 else 1)
+    xyz, returns = np.empty((room, 3)), np.empty((room, 2), dtype=np.uint8)
+    intensity, classes = np.empty(room, dtype=np.uint16), np.empty(room, dtype=np.uint8)
+    found = np.empty((48, 3))
+    echo = np.empty((_MOST + 1, 3))  # height above ground, reflectance, class
+    count = 0
+    for p in range(len(places)):
+        x, y, tx, ty = places[p]
+        counter = (number + p) * 32
+        ground = ground_at(terrain, raster[0], raster[1], raster[2], x, y)
+        height, hit, face = _solid_top(x, y, ground, tx, ty, size, solid_cells, planes)
+        echoes = _crown_echoes(
+            x, y, ground, tx, ty, height, size, blob_cells, blobs, tree, leaf_nir, found, echo, key, counter
+        )
+        if echoes < _MOST and (echoes == 0 or echo[echoes - 1, 0] > -1.0):
+            row = min(int((cover[1] - y) / cover[2]), codes.shape[0] - 1)
+            column = min(int((x - cover[0]) / cover[2]), codes.shape[1] - 1)
+            code = codes[row, column]
+            if hit >= 0:
+                kind = body[hit]
+                rough = 0.10 * gauss(key, counter + 1) if kind == _HEDGE else 0.0
+                cls = 6.0 if kind in (_BUILDING, _FURNITURE) else 3.0 if kind == _HEDGE else 1.0
+                _put(echo, echoes, max(height + rough, 0.0), roof_nir[hit] if face >= 4 else wall_nir[hit], cls)
+                echoes += 1
+            elif not (code == _POOL and uniform(key, counter + 2) < 0.93):
+                # Grass stands a few centimetres high, unevenly.
+                tuft = 0.03 * abs(gauss(key, counter + 3)) if code >= 64 else 0.0
+                _put(echo, echoes, tuft, ground_nir[code], 2.0 if code != _POOL else 9.0)
+                echoes += 1
+        if hit >= 0 or top_near(x, y, size, solid_cells[2]) > ground:
+            echoes = _edge_echo(
+                x, y, ground, tx, ty, height, size, solid_cells, planes, body, roof_nir, echo, echoes, key, counter
+            )
+        if echoes == 0:
+            continue
+        brightness = echo[0, 1]
+        if uniform(key, counter + 4) < noise[2] * (2.5 if brightness < 0.3 else 1.0):
+            continue
+        first = echoes - 1 if mode == 1 else 0
+        last = 1 if mode == 0 else echoes
+        off_x, off_y = noise[1] * gauss(key, counter + 5), noise[1] * gauss(key, counter + 6)
+        share = 1.0 / echoes
+        for e in range(first, last):
+            level = echo[e, 0]
+            px, py = x + tx * level + off_x, y + ty * level + off_y
+            if px < 0 or py < 0 or px >= extent[0] or py >= extent[1]:
+                continue
+            xyz[count, 0], xyz[count, 1] = px, py
+            xyz[count, 2] = ground + level + noise[0] * gauss(key, counter + 8 + e)
+            returns[count, 0], returns[count, 1] = e + 1, echoes
+            strength = echo[e, 1] * (0.35 + 0.65 * share) * (1.0 + 0.12 * gauss(key, counter + 16 + e))
+            intensity[count] = int(min(max(strength, 0.004), 1.0) * 40000.0)
+            classes[count] = int(echo[e, 2])
+            count += 1
+    return xyz[:count].copy(), returns[:count].copy(), intensity[:count].copy(), classes[:count].copy()
+
+
+@njit(cache=True)
+def _put(echo: NDArray[np.float64], e: int, level: float, reflectance: float, asprs: float) -> None:
+    echo[e, 0], echo[e, 1], echo[e, 2] = level, reflectance, asprs
+
+
+@njit(cache=True)
+def top_near(x: float, y: float, size: tuple[int, int], top: NDArray[np.float64]) -> float:
+    """Return the highest elevation of anything in the cell of a place."""
+    return top[int(y // 4.0) * size[0] + int(x // 4.0)]  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def _crown_echoes(
+    x: float,
+    y: float,
+    ground: float,
+    tx: float,
+    ty: float,
+    floor: float,
+    size: tuple[int, int],
+    cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
+    blobs: NDArray[np.float64],
+    tree: NDArray[np.int32],
+    leaf_nir: NDArray[np.float32],
+    found: NDArray[np.float64],
+    echo: NDArray[np.float64],
+    key: int,
+    counter: int,
+) -> int:
+    """Fill `echo` with the returns of leaves, the highest first; return how many."""
+    ways = _leaf_hits(x, y, ground, tx, ty, floor, size, cells, blobs, found)
+    echoes = 0
+    reached = 1e9
+    left = -math.log(1.0 - uniform(key, counter + 24)) / _DENSE
+    for m in range(ways):
+        upper, lower = min(found[m, 0], reached), found[m, 1]
+        while upper - lower > left and echoes < _MOST - 1:
+            upper -= left
+            k = int(found[m, 2])
+            apart = echoes == 0 or echo[echoes - 1, 0] - upper >= _DEAD_ZONE
+            if apart and upper > floor + _DEAD_ZONE * 0.5:
+                _put(echo, echoes, upper, leaf_nir[tree[k]], 5.0)
+                echoes += 1
+            left = -math.log(1.0 - uniform(key, counter + 25 + echoes)) / _LOOSE
+        if upper > lower:
+            left -= upper - lower
+        reached = min(reached, lower)
+    return echoes
+
+
+@njit(cache=True)
+def _edge_echo(
+    x: float,
+    y: float,
+    ground: float,
+    tx: float,
+    ty: float,
+    height: float,
+    size: tuple[int, int],
+    cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
+    planes: NDArray[np.float64],
+    body: NDArray[np.uint8],
+    roof_nir: NDArray[np.float32],
+    echo: NDArray[np.float64],
+    echoes: int,
+    key: int,
+    counter: int,
+) -> int:
+    """Add the return of the other part of the footprint where an edge runs through it."""
+    if echoes != 1:
+        return echoes
+    aside_x, aside_y = _FOOTPRINT * gauss(key, counter + 20), _FOOTPRINT * gauss(key, counter + 21)
+    other, hit, _ = _solid_top(x + aside_x, y + aside_y, ground, tx, ty, size, cells, planes)
+    if abs(other - height) < 1.5:
+        return echoes
+    if other > height:
+        echo[1] = echo[0]
+        _put(echo, 0, other, roof_nir[hit], 6.0 if body[hit] <= 1 else 1.0)
+    else:
+        _put(echo, 1, other, echo[0, 1] * 0.8, 2.0 if hit < 0 else 6.0)
+    return 2

@@ -1,0 +1,245 @@
+"""The orthoimage: a photograph rectified with the bare-earth DEM, so that everything above the ground leans.
+
+Nouns
+-----
+camera
+    Projection centre above the extent, so far beside its centre that the view there is off-nadir by `view_angle`.
+relief displacement
+    A point at height h above the ground, seen from flying height H at the horizontal distance R of the nadir, appears
+    ``R h / (H - h)`` too far out (flat ground).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..raster import Grid, Image
+from .groundcover import cover_codes
+from .lighting import AMBIENT, colour_surface, sun_vector
+from .recipe import SceneParameters
+from .streams import counter_key, fractal_tile, gauss, stream
+from .surface import rasterise
+from .world import World, ground_at
+
+__all__ = ["camera_position", "photograph"]
+
+_BLOCK = 32
+_TILE = 1024
+
+
+def camera_position(recipe: SceneParameters, seed: int) -> tuple[float, float, float]:
+    """Return the projection centre in local coordinates; its azimuth is the seed's, its distance the recipe's."""
+    turn = stream(seed, "image").random() * 2 * math.pi
+    away = recipe.flying_height * math.tan(math.radians(recipe.view_angle))
+    return (
+        recipe.width / 2 + away * math.cos(turn),
+        recipe.height / 2 + away * math.sin(turn),
+        recipe.elevation + recipe.flying_height,
+    )
+
+
+def photograph(world: World, origin: tuple[float, float]) -> Image | None:
+    """Return the orthoimage of a world, its grid in world coordinates; None without bands."""
+    recipe = world.recipe
+    if recipe.bands == "none":
+        return None
+    names = ("red", "green", "blue", "nir")[: len(recipe.bands)]
+    grid = Grid.covering((0, 0, recipe.width, recipe.height), recipe.gsd)
+    rng = stream(world.seed, "texture")
+    fine, coarse = fractal_tile(rng, _TILE, 4, 0.8), fractal_tile(rng, _TILE, 128, 0.62)
+    surface = rasterise(world, grid, fine)
+    colours = colour_surface(world, surface, cover_codes(world, grid), (fine, coarse), len(names))
+    shift = _shift(recipe, world.seed)
+    terrain = world.terrain
+    leaning = np.empty_like(colours)
+    _lean(
+        leaning,
+        colours,
+        surface.z,
+        surface.label,
+        (grid.west, grid.north, grid.gsd),
+        terrain.values,
+        (terrain.grid.west, terrain.grid.north, terrain.grid.gsd),
+        camera_position(recipe, world.seed),
+        shift,
+        world.solids.wall,
+        world.solids.base,
+        sun_vector(recipe),
+        AMBIENT,
+    )
+    values = _expose(leaning, _kernel(recipe.blur), recipe.image_noise, counter_key(world.seed, "image"))
+    moved = Grid(grid.west + origin[0], grid.north + origin[1], grid.gsd, grid.rows, grid.columns)
+    return Image(values, names, moved)
+
+
+def _shift(recipe: SceneParameters, seed: int) -> tuple[float, float]:
+    """Return the registration error: its length is the recipe's, its direction the seed's."""
+    turn = stream(seed, "image").random(2)[1] * 2 * math.pi
+    return recipe.registration_shift * math.cos(turn), recipe.registration_shift * math.sin(turn)
+
+
+def _kernel(sigma: float) -> NDArray[np.float32]:
+    """Return half of a normalised Gaussian, centre first."""
+    if sigma < 0.05:
+        return np.ones(1, dtype=np.float32)
+    half = [math.exp(-0.5 * (k / sigma) ** 2) for k in range(max(1, math.ceil(2.5 * sigma)) + 1)]
+    total = half[0] + 2 * sum(half[1:])
+    return np.array([value / total for value in half], dtype=np.float32)
+
+
+@njit(cache=True)
+def _reach(
+    z: NDArray[np.float32],
+    frame: tuple[float, float, float],
+    terrain: NDArray[np.float32],
+    raster: tuple[float, float, float],
+    camera: tuple[float, float, float],
+) -> NDArray[np.float64]:
+    """Return, per block of the image, the greatest height above ground that can lean into it."""
+    rows, columns = (z.shape[0] + _BLOCK - 1) // _BLOCK, (z.shape[1] + _BLOCK - 1) // _BLOCK
+    own = np.zeros((rows, columns))
+    for r in range(z.shape[0]):
+        y = frame[1] - (r + 0.5) * frame[2]
+        for c in range(z.shape[1]):
+            height = z[r, c] - ground_at(terrain, raster[0], raster[1], raster[2], frame[0] + (c + 0.5) * frame[2], y)
+            if height > own[r // _BLOCK, c // _BLOCK]:
+                own[r // _BLOCK, c // _BLOCK] = height
+    widest = max(abs(camera[0] - frame[0]), abs(camera[0] - frame[0] - z.shape[1] * frame[2]))
+    deepest = max(abs(camera[1] - frame[1]), abs(camera[1] - frame[1] + z.shape[0] * frame[2]))
+    lean = math.sqrt(widest * widest + deepest * deepest) / (camera[2] - z.max())
+    reach = np.zeros((rows, columns))
+    for r in range(rows):
+        for c in range(columns):
+            if own[r, c] < 0.1:
+                continue
+            away = int(own[r, c] * lean / (_BLOCK * frame[2])) + 1
+            for i in range(max(0, r - away), min(rows, r + away + 1)):
+                for j in range(max(0, c - away), min(columns, c + away + 1)):
+                    reach[i, j] = max(reach[i, j], own[r, c])
+    return reach
+
+
+@njit(cache=True)
+def _lean(
+    out: NDArray[np.uint8],
+    colours: NDArray[np.uint8],
+    z: NDArray[np.float32],
+    label: NDArray[np.int32],
+    frame: tuple[float, float, float],
+    terrain: NDArray[np.float32],
+    raster: tuple[float, float, float],
+    camera: tuple[float, float, float],
+    shift: tuple[float, float],
+    wall: NDArray[np.float32],
+    base: NDArray[np.float64],
+    sun: tuple[float, float, float],
+    ambient: NDArray[np.float32],
+) -> None:
+    """Follow, for every image cell, the ray from its place on the bare earth to the camera: the last hit is seen."""
+    west, north, gsd = frame
+    bands, rows, columns = out.shape
+    reach = _reach(z, frame, terrain, raster, camera)
+    for r in range(rows):
+        for c in range(columns):
+            x = west + (c + 0.5) * gsd - shift[0]
+            y = north - (r + 0.5) * gsd - shift[1]
+            i0 = min(max(math.floor((north - y) / gsd), 0), rows - 1)
+            j0 = min(max(math.floor((x - west) / gsd), 0), columns - 1)
+            tallest = reach[i0 // _BLOCK, j0 // _BLOCK]
+            if tallest < 0.1:
+                for b in range(bands):
+                    out[b, r, c] = colours[b, i0, j0]
+                continue
+            ground = ground_at(terrain, raster[0], raster[1], raster[2], x, y)
+            tx, ty = (camera[0] - x) / (camera[2] - ground), (camera[1] - y) / (camera[2] - ground)
+            lean = max(abs(tx), abs(ty), 1e-6)
+            step = 0.8 * gsd / lean
+            count = int(tallest / step) + 1
+            i, j, side = i0, j0, -1.0
+            for k in range(count, -1, -1):
+                height = min(k * step, tallest)
+                pi = math.floor((north - y - ty * height) / gsd)
+                pj = math.floor((x + tx * height - west) / gsd)
+                if pi < 0 or pj < 0 or pi >= rows or pj >= columns:
+                    continue
+                above = z[pi, pj] - ground - height
+                if above >= -0.05 or k == 0:
+                    i, j = pi, pj
+                    # Deep below the top where the ray meets the surface: it came in through the side.
+                    if k < count and above > step + 0.6:
+                        side = ground + height
+                    break
+            mark = label[i, j]
+            if side < 0 or mark == 0:
+                for b in range(bands):
+                    out[b, r, c] = colours[b, i, j]
+            elif mark < 0:
+                for b in range(bands):
+                    out[b, r, c] = int(colours[b, i, j] * 0.72)
+            else:
+                _wall(out, r, c, (mark - 1) >> 3, x, y, side, tx, ty, lean, wall, base, sun, ambient)
+
+
+@njit(cache=True)
+def _wall(
+    out: NDArray[np.uint8],
+    r: int,
+    c: int,
+    k: int,
+    x: float,
+    y: float,
+    level: float,
+    tx: float,
+    ty: float,
+    lean: float,
+    wall: NDArray[np.float32],
+    base: NDArray[np.float64],
+    sun: tuple[float, float, float],
+    ambient: NDArray[np.float32],
+) -> None:
+    """Colour a cell that shows a wall: it looks towards the camera; floors are bands of windows."""
+    towards = (tx * sun[0] + ty * sun[1]) / math.sqrt(tx * tx + ty * ty)
+    direct = max(towards, 0.0) / sun[2]
+    storey = ((level - base[k]) / 3.2) % 1.0
+    window = 0.62 if 0.35 < storey < 0.8 and ((x + y) * 0.31) % 1.0 < 0.7 else 1.0
+    for b in range(out.shape[0]):
+        light = ambient[b] * 1.1 + (1.0 - ambient[b]) * direct * 0.9
+        out[b, r, c] = int(min(wall[k, b] * window * light * 255.0, 250.0))
+
+
+@njit(cache=True)
+def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float, key: int) -> NDArray[np.uint8]:
+    """Blur by the point spread and add noise that is the same for no two cells nor bands."""
+    bands, rows, columns = values.shape
+    out = np.empty_like(values)
+    half = len(kernel) - 1
+    line = np.empty((rows if rows < 1 else 1, columns), dtype=np.float32)
+    ring = np.empty((2 * half + 1, columns), dtype=np.float32)
+    for b in range(bands):
+        for r in range(-half, rows + half):
+            source = min(max(r, 0), rows - 1)
+            target = ring[(r + half) % (2 * half + 1)]
+            for c in range(columns):
+                total = kernel[0] * values[b, source, c]
+                for t in range(1, half + 1):
+                    left, right = max(c - t, 0), min(c + t, columns - 1)
+                    total += kernel[t] * (np.float32(values[b, source, left]) + np.float32(values[b, source, right]))
+                target[c] = total
+            centre = r - half
+            if centre < 0:
+                continue
+            for c in range(columns):
+                total = kernel[0] * ring[(centre + half) % (2 * half + 1), c]
+                for t in range(1, half + 1):
+                    total += kernel[t] * (
+                        ring[(centre - t + half) % (2 * half + 1), c] + ring[(centre + t + half) % (2 * half + 1), c]
+                    )
+                line[0, c] = total
+            for c in range(columns):
+                value = line[0, c] + noise * 255.0 * gauss(key, (b * rows + centre) * columns + c) + 0.5
+                out[b, centre, c] = int(min(max(value, 0.0), 255.0))
+    return out

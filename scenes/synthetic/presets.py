@@ -1,0 +1,238 @@
+"""Presets: recipes with the printed facts of the papers' data sets, and small versions of them.
+
+What is printed (extent, buildings, elevations, image, points) is kept; what is not is chosen for the printed character
+and says so here.
+
+======================  =====================================================================================
+fairfield               Awrangjeb et al. 2011, section 3: 588 m x 417 m, 370 buildings, 1-23 m, RGB 0.15 m, last
+                        pulse 0.5 m, "many large industrial buildings", little vegetation, aligned; 2010,
+                        section 4.3: roofs and tree tops displaced, alignment not perfect
+fairfield-1, -2, -3     2010, section 4.3: 248 x 210 m with 70, 155 x 219 m with 62, 228 x 189 m with 60 buildings;
+                        1 and 2 only residential, 3 also industrial
+moonee-ponds            2011: 447 x 447 m, 250 buildings, 23-43 m, RGBI 0.10 m, first pulse 1 m, some green buildings
+knox                    2011: 400 x 400 m, 130 buildings, 110-270 m, RGB 0.10 m, first pulse 1 m, "outer suburban with
+                        lower housing density and extensive tree coverage that partially covers buildings"
+toronto-a, -b           Yu et al. 2013, section 3: 1.45 km2 in all, 130 and 153 outlines, 1 755 589 and 1 928 393
+                        points. Our choice: the area is split in proportion to the points; an RGB image of 0.25 m,
+                        because the other detectors need one
+vaihingen-a, -b         2013: 263 and 290 outlines, 3 775 182 and 3 582 656 points. Our choice: 750 x 750 m and
+                        731 x 731 m, which is 6.7 points per m2 as the ISPRS benchmark tells of that flight; an RGBI
+                        image of 0.25 m
+======================  =====================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import UnknownNameError
+from ..names import nearest_hint
+from .recipe import SceneParameters
+
+__all__ = ["preset", "preset_names"]
+
+_FAIRFIELD: dict[str, Any] = {
+    "width": 588,
+    "height": 417,
+    "epsg": 32756,
+    "elevation": 1,
+    "slope": 1.55,
+    "aspect": 28,
+    "undulation": 10.5,
+    "orientation": 9,
+    "orientation_spread": 0.8,
+    "street_width": 15,
+    "block_length": 170,
+    "parcel_width": 15.5,
+    "parcel_depth": 32,
+    "setback": 6,
+    "hall_share": 0.2,
+    "park_share": 0.0,
+    "buildings": 370,
+    "outbuildings": 0.62,
+    "gap": 2.0,
+    "tree_density": 14,
+    "tree_height": 6,
+    "dryness": 0.55,
+    "point_spacing": 0.5,
+    "pulse": "last",
+    "bands": "rgb",
+    "gsd": 0.15,
+    "view_angle": 10,
+    "registration_shift": 0.7,
+    "two_storeys": 0.1,
+}
+_MOONEE_PONDS: dict[str, Any] = {
+    "width": 447,
+    "height": 447,
+    "epsg": 32755,
+    "elevation": 23,
+    "slope": 1.5,
+    "aspect": 115,
+    "undulation": 12.6,
+    "orientation": -12,
+    "orientation_spread": 2.0,
+    "street_width": 15,
+    "block_length": 150,
+    "parcel_width": 16.5,
+    "parcel_depth": 38,
+    "setback": 5,
+    "buildings": 250,
+    "outbuildings": 0.4,
+    "gap": 2.4,
+    "park_share": 0.06,
+    "green_roof_share": 0.12,
+    "two_storeys": 0.25,
+    "gable_roofs": 0.45,
+    "tree_density": 30,
+    "tree_height": 7,
+    "point_spacing": 1.0,
+    "pulse": "first",
+    "bands": "rgbi",
+    "gsd": 0.10,
+    "view_angle": 9,
+    "registration_shift": 0.3,
+    "vertical_noise": 0.08,
+    "horizontal_noise": 0.25,
+}
+_KNOX: dict[str, Any] = {
+    "width": 400,
+    "height": 400,
+    "epsg": 32755,
+    "elevation": 110,
+    "slope": 15.5,
+    "aspect": 245,
+    "undulation": 62,
+    "terracing": 0.6,
+    "orientation": 25,
+    "winding": 38,
+    "orientation_spread": 24,
+    "street_width": 16,
+    "block_length": 190,
+    "parcel_width": 20.5,
+    "parcel_depth": 42,
+    "setback": 9,
+    "buildings": 130,
+    "outbuildings": 0.34,
+    "gap": 4.5,
+    "park_share": 0.1,
+    "two_storeys": 0.25,
+    "tree_density": 150,
+    "tree_height": 9.5,
+    "tree_gap": 0.4,
+    "tree_clumping": 0.4,
+    "woodland": 0.5,
+    "dryness": 0.3,
+    "point_spacing": 1.0,
+    "pulse": "first",
+    "bands": "rgb",
+    "gsd": 0.10,
+    "view_angle": 12,
+    "registration_shift": 0.6,
+    "vertical_noise": 0.1,
+    "horizontal_noise": 0.3,
+    "sun_elevation": 42,
+}
+_TORONTO: dict[str, Any] = {
+    "epsg": 32617, "elevation": 76, "slope": 0.4, "aspect": 75, "undulation": 3, "orientation": -17,
+    "orientation_spread": 0.3, "zone": "towers", "street_width": 24, "block_length": 130, "parcel_width": 46,
+    "parcel_depth": 46, "setback": 0, "outbuildings": 0, "gap": 8, "park_share": 0.06, "tallest": 190,
+    "roof_palette": "north-american", "tree_density": 9, "tree_height": 7, "tree_gap": 2.5, "autumn_share": 0.2,
+    "pulse": "all", "bands": "rgb", "gsd": 0.25, "view_angle": 8, "scan_angle": 10, "sun_azimuth": 150,
+    "sun_elevation": 50, "horizontal_noise": 0.15,
+}  # fmt: skip
+_VAIHINGEN: dict[str, Any] = {
+    "epsg": 32632,
+    "elevation": 265,
+    "slope": 1.2,
+    "aspect": 60,
+    "undulation": 12,
+    "orientation": 33,
+    "winding": 22,
+    "orientation_spread": 6,
+    "zone": "village",
+    "street_width": 11,
+    "block_length": 120,
+    "parcel_width": 21,
+    "parcel_depth": 29,
+    "setback": 4,
+    "gap": 4.0,
+    "two_storeys": 0.5,
+    "roof_pitch": 38,
+    "gable_roofs": 0.75,
+    "roof_palette": "central-european",
+    "outbuildings": 0.32,
+    "tree_density": 38,
+    "tree_height": 7.5,
+    "tree_gap": 1.0,
+    "dryness": 0.25,
+    "woodland": 0.25,
+    "conifers": 0.2,
+    "pulse": "all",
+    "bands": "rgbi",
+    "gsd": 0.25,
+    "view_angle": 7,
+    "sun_azimuth": 165,
+    "sun_elevation": 46,
+    "park_share": 0.1,
+}
+
+#: The parts of Fairfield without industry, where garages and sheds are many.
+_RESIDENTIAL = _FAIRFIELD | {"hall_share": 0.0, "undulation": 4, "outbuildings": 0.8}
+
+_FULL: Mapping[str, dict[str, Any]] = {
+    "fairfield": _FAIRFIELD,
+    "fairfield-1": _RESIDENTIAL | {"width": 248, "height": 210, "buildings": 70},
+    "fairfield-2": _RESIDENTIAL | {"width": 155, "height": 219, "buildings": 62, "parcel_width": 14.8},
+    "fairfield-3": _FAIRFIELD | {"width": 228, "height": 189, "buildings": 60, "undulation": 6},
+    "moonee-ponds": _MOONEE_PONDS,
+    "knox": _KNOX,
+    "toronto-a": _TORONTO | {"width": 831, "height": 831, "buildings": 130, "point_spacing": 0.639},
+    "toronto-b": _TORONTO | {"width": 871, "height": 871, "buildings": 153, "point_spacing": 0.639, "orientation": -14},
+    "vaihingen-a": _VAIHINGEN | {"width": 750, "height": 750, "buildings": 263, "point_spacing": 0.4135},
+    "vaihingen-b": _VAIHINGEN | {"width": 731, "height": 731, "buildings": 290, "point_spacing": 0.4135},
+}  # fmt: skip
+
+#: Side of a small version, metres, and its buildings.
+_SMALL: Mapping[str, tuple[int, int]] = {
+    "fairfield": (110, 12),
+    "fairfield-1": (110, 13),
+    "fairfield-2": (110, 16),
+    "fairfield-3": (110, 12),
+    "moonee-ponds": (110, 11),
+    "knox": (150, 8),
+    "toronto-a": (200, 6),
+    "toronto-b": (200, 7),
+    "vaihingen-a": (110, 8),
+    "vaihingen-b": (110, 9),
+}
+
+
+def preset_names() -> list[str]:
+    """Return the names of all presets, small ones last."""
+    return [*_FULL, *(f"{name}-small" for name in _FULL)]
+
+
+def preset(name: str, **changes: Any) -> SceneParameters:
+    """Return the recipe of a preset with some parameters changed.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is no such preset; the message names the nearest.
+    ParameterError
+        For an unknown parameter or a value outside its range.
+    """
+    full = name.removesuffix("-small")
+    if full not in _FULL:
+        raise UnknownNameError(
+            f"no preset called {name!r}{nearest_hint(name, preset_names())}; there are {', '.join(preset_names())}"
+        )
+    values = dict(_FULL[full])
+    if name != full:
+        side, buildings = _SMALL[full]
+        # Relief belongs to a landscape, of which a small scene sees a part.
+        values["undulation"] *= side / max(values["width"], values["height"])
+        values |= {"width": side, "height": side, "buildings": buildings, "park_share": 0.0}
+    return SceneParameters.build(values | changes)

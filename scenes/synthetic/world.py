@@ -1,0 +1,161 @@
+"""The world of a scene: the truth that measurements are taken of.
+
+Local world coordinates: x east, y north from the lower left corner of the extent, metres; z is elevation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..raster import Elevation
+from .buildings import build
+from .clutter import patch_table, scatter
+from .layout import Layout, plan_layout, plan_sites
+from .recipe import SceneParameters
+from .solids import Body, Solids
+from .terrain import natural_terrain, terraced
+from .vegetation import Trees, grow
+
+__all__ = ["CellIndex", "World", "ground_at", "make_world"]
+
+_CELL = 4.0
+#: Objects are listed in the cells within this distance, so that a path sampled every 2 m cannot slip past one.
+_REACH = 1.1
+
+
+@dataclass(frozen=True)
+class World:
+    """Everything that stands in a scene.
+
+    Attributes
+    ----------
+    recipe : SceneParameters
+    seed : int
+    terrain : Elevation
+        Bare earth with its pads, local coordinates.
+    layout : Layout
+    solids : Solids
+    trees : Trees
+    patches : ndarray of float64, shape (n, 6)
+        x, y, angle, length, width, cover.
+    """
+
+    recipe: SceneParameters
+    seed: int
+    terrain: Elevation
+    layout: Layout
+    solids: Solids
+    trees: Trees
+    patches: NDArray[np.float64]
+
+
+def make_world(recipe: SceneParameters, seed: int) -> World:
+    """Grow and build the world of a recipe and a seed."""
+    ground = natural_terrain(recipe, seed)
+    layout = plan_layout(recipe, seed)
+    sites = plan_sites(layout, recipe, seed)
+    town = build(sites, ground, recipe, seed)
+    terrain = terraced(ground, [part for part in town.solids if part.body == Body.BUILDING], recipe.terracing)
+    clutter, patches = scatter(sites, town, layout, recipe, seed)
+    if clutter:
+        levels = terrain.sample([thing.x for thing in clutter], [thing.y for thing in clutter])
+        for thing, level in zip(clutter, levels.tolist(), strict=True):
+            thing.base = level
+    trees = grow(terrain, layout, list(town.solids), recipe, seed)
+    return World(recipe, seed, terrain, layout, Solids.of([*town.solids, *clutter]), trees, patch_table(patches))
+
+
+@njit(cache=True)
+def ground_at(values: NDArray[np.float32], west: float, north: float, gsd: float, x: float, y: float) -> float:
+    """Bilinear elevation, clamped at the border (the kernel form of `Elevation.sample`)."""
+    row = min(max((north - y) / gsd - 0.5, 0.0), values.shape[0] - 1.001)
+    column = min(max((x - west) / gsd - 0.5, 0.0), values.shape[1] - 1.001)
+    i, j = int(row), int(column)
+    down, right = row - i, column - j
+    upper = values[i, j] * (1 - right) + values[i, j + 1] * right
+    lower = values[i + 1, j] * (1 - right) + values[i + 1, j + 1] * right
+    return upper * (1 - down) + lower * down  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
+class CellIndex:
+    """Which objects touch which square cell of the extent: compressed rows, ``items[start[c]:start[c + 1]]``.
+
+    Attributes
+    ----------
+    columns, rows : int
+        Cells, row 0 in the south.
+    start : ndarray of int64, shape (rows * columns + 1,)
+    items : ndarray of int32
+    top : ndarray of float64, shape (rows * columns,)
+        Highest elevation of any object in the cell, -inf without one.
+    """
+
+    columns: int
+    rows: int
+    start: NDArray[np.int64]
+    items: NDArray[np.int32]
+    top: NDArray[np.float64]
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float]:
+        """What kernels take: start, items, top, and the highest elevation of all."""
+        return self.start, self.items, self.top, float(self.top.max())
+
+    @classmethod
+    def of(cls, recipe: SceneParameters, boxes: NDArray[np.float64], top: NDArray[np.float64]) -> CellIndex:
+        """Index objects by their boxes ``xmin, ymin, xmax, ymax``, shape (n, 4)."""
+        columns, rows = int(recipe.width // _CELL) + 1, int(recipe.height // _CELL) + 1
+        start, items, highest = _fill_cells(boxes, top, columns, rows)
+        return cls(columns, rows, start, items, highest)
+
+    @classmethod
+    def of_solids(cls, world: World) -> CellIndex:
+        """Index the solids."""
+        solids = world.solids
+        cosine, sine = np.abs(np.cos(solids.rectangle[:, 2])), np.abs(np.sin(solids.rectangle[:, 2]))
+        half_x = (solids.rectangle[:, 3] * cosine + solids.rectangle[:, 4] * sine) / 2
+        half_y = (solids.rectangle[:, 3] * sine + solids.rectangle[:, 4] * cosine) / 2
+        x, y = solids.rectangle[:, 0], solids.rectangle[:, 1]
+        boxes = np.stack([x - half_x, y - half_y, x + half_x, y + half_y], axis=-1)
+        return cls.of(world.recipe, boxes, solids.ridge)
+
+    @classmethod
+    def of_blobs(cls, world: World) -> CellIndex:
+        """Index the blobs of the trees."""
+        x, y, z, across, up = world.trees.blobs.T
+        return cls.of(world.recipe, np.stack([x - across, y - across, x + across, y + across], axis=-1), z + up)
+
+
+@njit(cache=True)
+def _fill_cells(
+    boxes: NDArray[np.float64], top: NDArray[np.float64], columns: int, rows: int
+) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
+    start = np.zeros(rows * columns + 1, dtype=np.int64)
+    highest = np.full(rows * columns, -np.inf)
+    items = np.empty(0, dtype=np.int32)
+    cursor = np.zeros(0, dtype=np.int64)
+    for filling in (False, True):
+        if filling:
+            start[1:] = np.cumsum(start[1:])
+            items = np.empty(start[-1], dtype=np.int32)
+            cursor = start[:-1].copy()
+        for k in range(len(boxes)):
+            left = max(0, int((boxes[k, 0] - _REACH) // _CELL))
+            right = min(columns - 1, int((boxes[k, 2] + _REACH) // _CELL))
+            bottom = max(0, int((boxes[k, 1] - _REACH) // _CELL))
+            upper = min(rows - 1, int((boxes[k, 3] + _REACH) // _CELL))
+            for j in range(bottom, upper + 1):
+                for i in range(left, right + 1):
+                    cell = j * columns + i
+                    if filling:
+                        items[cursor[cell]] = k
+                        cursor[cell] += 1
+                        highest[cell] = max(highest[cell], top[k])
+                    else:
+                        start[cell + 1] += 1
+    return start, items, highest

@@ -1,0 +1,95 @@
+"""Presets hold the facts that the papers print, and the small ones are small versions of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+import roofbench as rb
+from roofbench.scenes.synthetic import preset_names
+from roofbench.scenes.synthetic.presets import preset
+
+# Printed: extent (m), buildings, lowest and highest ground (m), bands, GSD (m), pulse, point spacing (m).
+# Awrangjeb et al. 2010, section 4.3, and 2011, section 3.
+AWRANGJEB = {
+    "fairfield": ((588, 417), 370, (1, 23), ("red", "green", "blue"), 0.15, "last", 0.5),
+    "fairfield-1": ((248, 210), 70, None, ("red", "green", "blue"), 0.15, "last", 0.5),
+    "fairfield-2": ((155, 219), 62, None, ("red", "green", "blue"), 0.15, "last", 0.5),
+    "fairfield-3": ((228, 189), 60, None, ("red", "green", "blue"), 0.15, "last", 0.5),
+    "moonee-ponds": ((447, 447), 250, (23, 43), ("red", "green", "blue", "nir"), 0.10, "first", 1.0),
+    "knox": ((400, 400), 130, (110, 270), ("red", "green", "blue"), 0.10, "first", 1.0),
+}
+# Printed: outlines and points. Yu et al. 2013, section 3; the two areas of Toronto have 1.45 km2 in all.
+YU = {
+    "toronto-a": (130, 1_755_589),
+    "toronto-b": (153, 1_928_393),
+    "vaihingen-a": (263, 3_775_182),
+    "vaihingen-b": (290, 3_582_656),
+}
+SMALL = [name for name in preset_names() if name.endswith("-small")]
+
+
+@pytest.mark.parametrize("name", AWRANGJEB)
+def test_a_preset_has_the_printed_extent_buildings_relief_and_points(name):
+    extent, buildings, relief, bands, _, pulse, spacing = AWRANGJEB[name]
+    scene = rb.make_scene(name, seed=1)
+    xmin, ymin, xmax, ymax = scene.extent
+    assert (xmax - xmin, ymax - ymin) == extent
+    assert len(set(scene.reference.building_ids.tolist())) == buildings
+    if relief is not None:
+        low, high = float(scene.dem.values.min()), float(scene.dem.values.max())
+        assert low == pytest.approx(relief[0], abs=1.0)
+        assert high - low == pytest.approx(relief[1] - relief[0], rel=0.08)
+    assert scene.facts["parameters"]["pulse"] == pulse
+    assert scene.facts["parameters"]["bands"] == "rgbi"[: len(bands)]
+    # A few pulses return nothing.
+    assert math.sqrt(extent[0] * extent[1] / len(scene.points)) == pytest.approx(spacing, rel=0.04)
+    assert scene.points.return_number is None
+
+
+@pytest.mark.parametrize("name", YU)
+def test_the_scenes_of_2013_have_the_printed_outlines_and_points(name):
+    buildings, points = YU[name]
+    scene = rb.make_scene(name, seed=1)
+    assert len(set(scene.reference.building_ids.tolist())) == buildings
+    assert len(scene.points) == pytest.approx(points, rel=0.05)
+    assert scene.points.return_number.max() > 1
+
+
+def test_the_areas_of_toronto_add_up_to_the_printed_one():
+    recipes = [preset("toronto-a"), preset("toronto-b")]
+    assert sum(recipe.width * recipe.height for recipe in recipes) == pytest.approx(1.45e6, rel=0.005)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_small_version_differs_in_size_alone(name):
+    small, full = preset(name).values(), preset(name.removesuffix("-small")).values()
+    differing = {key for key in small if small[key] != full[key]}
+    assert differing <= {"width", "height", "buildings", "park_share", "undulation"}
+    assert small["width"] * small["height"] <= 200**2
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_small_version_holds_its_buildings_with_every_seed(name):
+    for seed in range(12):
+        reference = rb.make_scene(name, seed=seed).reference
+        assert len(set(reference.building_ids.tolist())) == preset(name).buildings
+
+
+def test_an_image_has_the_printed_cell_size_and_bands():
+    image = rb.make_scene("moonee-ponds-small", seed=2).image
+    assert (image.grid.gsd, image.bands) == (0.1, ("red", "green", "blue", "nir"))
+    assert image.values.shape == (4, 1100, 1100)
+    assert rb.make_scene("knox-small", bands="none").image is None
+
+
+def test_knox_is_hilly_and_wooded_where_fairfield_is_neither():
+    knox, fairfield = (rb.make_scene(name, seed=3) for name in ("knox-small", "fairfield-small"))
+
+    def tall(scene):
+        height = scene.points.z - scene.dem.sample(scene.points.x, scene.points.y)
+        return float(np.mean((height > 2.5) & (scene.points.classification == 5)))
+
+    assert np.ptp(knox.dem.values) > 20 > 10 > np.ptp(fairfield.dem.values)
+    assert tall(knox) > 0.15
+    assert tall(fairfield) < 0.06
