@@ -136,17 +136,10 @@ class Elevation:
 
     def sample(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Return bilinear elevation at points, shape of `x`; clamped at the border, NaN beside unknown cells."""
-        row, column = self.grid.to_pixel(x, y)
-        row = np.clip(row - 0.5, 0, self.grid.rows - 1)
-        column = np.clip(column - 0.5, 0, self.grid.columns - 1)
-        row0 = np.minimum(row.astype(np.intp), max(self.grid.rows - 2, 0))
-        column0 = np.minimum(column.astype(np.intp), max(self.grid.columns - 2, 0))
-        row1, column1 = (
-            np.minimum(row0 + 1, self.grid.rows - 1),
-            np.minimum(column0 + 1, self.grid.columns - 1),
-        )
-        down, right = row - row0, column - column0
-        values = self.values
-        upper = values[row0, column0] * (1 - right) + values[row0, column1] * right
-        lower = values[row1, column0] * (1 - right) + values[row1, column1] * right
-        return np.asarray(upper * (1 - down) + lower * down, dtype=np.float64)
+        # numba takes a while to load, and evaluating footprints does not sample.
+        from .sampling import bilinear
+
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        grid = self.grid
+        sampled: NDArray[np.float64] = bilinear(self.values, grid.west, grid.north, grid.gsd, x.ravel(), y.ravel())
+        return sampled.reshape(x.shape)
