@@ -156,7 +156,13 @@ class StoreReader:
             area=None if row["area"] is None else shapely.from_wkb(row["area"]),
             reference=reference,
             facts=json.loads(row["facts"] or "{}"),
+            point_count=row["point_count"],
         )
+
+    def scene_picture(self, scene_id: int) -> bytes | None:
+        """Return the picture of a scene (WebP over its extent); None when it has none or was never opened."""
+        row = self._db.execute("SELECT content FROM scene_pictures WHERE scene_id = ?", (scene_id,)).fetchone()
+        return None if row is None else bytes(row["content"])
 
     def reference_counts(self) -> dict[int, int | None]:
         """Return the number of reference footprints of every scene that was opened; None where it has no reference."""

@@ -19,6 +19,7 @@ import shapely
 from ..detectors.base import Detector
 from ..detectors.checks import checked_output
 from ..evaluators.base import Evaluator
+from ..reports.scene_picture import scene_picture
 from ..scenes.errors import RoofbenchError
 from ..scenes.footprints import Footprints
 from ..scenes.scene import Scene
@@ -122,7 +123,7 @@ def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecip
 
 def describe(scene: Scene) -> SceneRecord:
     """Return what the store keeps of a scene."""
-    reference, grid = scene.reference, scene.evaluation_grid
+    reference, grid, picture = scene.reference, scene.evaluation_grid, scene_picture(scene)
     labels = None if reference is None or reference.building_ids is None else reference.building_ids
     return SceneRecord(
         content_hash=scene.content_hash,
@@ -134,6 +135,8 @@ def describe(scene: Scene) -> SceneRecord:
         reference_ids=() if reference is None else tuple(reference.ids.tolist()),
         building_ids=None if labels is None else tuple(_plain(label) for label in labels),
         facts={name: value for name, value in scene.facts.items() if _is_json(value)},
+        point_count=None if scene.points is None else len(scene.points),
+        picture=None if picture is None else picture.content,
     )
 
 
