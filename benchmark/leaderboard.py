@@ -14,7 +14,7 @@ from .plan import Judge
 from .records import RunRow
 from .store import Store
 
-__all__ = ["default_rank_index", "incidents_of", "make_leaderboard", "repeat_command"]
+__all__ = ["default_rank_index", "incidents_of", "make_leaderboard", "rank_index", "repeat_command"]
 
 
 def make_leaderboard(
@@ -44,7 +44,7 @@ def make_leaderboard(
     rows = [row for row in rows if row.scene not in bare]
     scenes = tuple(dict.fromkeys(row.scene for row in rows))
     indices = tuple(index for index in judge.evaluator.indices if index.main)
-    ranking = _index(judge.evaluator, rank_by)
+    ranking = rank_index(judge.evaluator, rank_by)
     if ranking.key not in [index.key for index in indices]:
         indices = (*indices, ranking)
     boards = [
@@ -151,7 +151,8 @@ def default_rank_index(evaluator: Evaluator) -> Index:
     return next((index for index in directed if index.key == "object.quality"), (directed or evaluator.indices)[0])
 
 
-def _index(evaluator: Evaluator, key: str | None) -> Index:
+def rank_index(evaluator: Evaluator, key: str | None) -> Index:
+    """Return the index of that key, or the default one; an unknown key is answered with the nearest."""
     if key is None:
         return default_rank_index(evaluator)
     known = {index.key: index for index in evaluator.indices}

@@ -226,6 +226,16 @@ class StoreReader:
         rows = self._db.execute("SELECT key, evaluator, parameters FROM evaluations GROUP BY key ORDER BY MIN(id)")
         return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
 
+    def evaluators_of(self, run_id: int) -> list[tuple[str, PluginRecipe]]:
+        """Return the key and recipe of every evaluator that has judged this run."""
+        query = "SELECT key, evaluator, parameters FROM evaluations WHERE run_id = ? ORDER BY id"
+        rows = self._db.execute(query, (run_id,))
+        return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
+
+    def count_runs(self) -> int:
+        """Return how many runs are stored."""
+        return int(self._db.execute("SELECT COUNT(*) FROM runs").fetchone()[0])
+
     def code(self, run_id: int) -> SourceClosure:
         """Return the source closure that a run was made with."""
         query = "SELECT modules, packages FROM codes JOIN runs ON code_id = codes.id WHERE runs.id = ?"

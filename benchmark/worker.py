@@ -27,7 +27,7 @@ from .keys import random_stream_entropy
 from .recipes import PluginRecipe, SceneRecipe, code_digest
 from .tasks import Cost, Outcome, SceneRecord, Score, Task, _plain
 
-__all__ = ["detect", "execute", "execute_text", "machine_facts"]
+__all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream"]
 
 #: Scenes that were opened last; neighbouring tasks of a plan are about one scene.
 _scenes: OrderedDict[str, Scene] = OrderedDict()
@@ -38,8 +38,12 @@ def detect(scene: Scene, detector: Detector, *, seed: int = 0) -> Footprints:
     """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector."""
     visible = scene.for_detection()
     visible.require(detector.requires)
-    rng = np.random.default_rng(np.random.SeedSequence(random_stream_entropy(seed, scene.name, detector.name)))
-    return checked_output(detector.detect(visible, rng), scene, detector.name)
+    return checked_output(detector.detect(visible, random_stream(seed, scene, detector)), scene, detector.name)
+
+
+def random_stream(seed: int, scene: Scene, detector: Detector) -> np.random.Generator:
+    """Return the generator from which a detector draws on a scene."""
+    return np.random.default_rng(np.random.SeedSequence(random_stream_entropy(seed, scene.name, detector.name)))
 
 
 def execute_text(task: str) -> bytes:

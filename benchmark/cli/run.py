@@ -78,7 +78,7 @@ def run(
     from rich.console import Console
 
     from ...reports.tables import print_incidents
-    from ..leaderboard import incidents_of, make_leaderboard
+    from ..leaderboard import incidents_of, make_leaderboard, rank_index
     from ..plan import make_plan, plan_content, suite_from_content
     from ..runner import Execution, run_plan
     from ..store import Store
@@ -100,6 +100,7 @@ def run(
             suite = suite.with_seeds(seeds)
         if scenes is not None:
             suite = suite.with_scenes(scenes)
+        rank_index(suite.evaluators[0], rank_by)
         plan = make_plan(suite, opened, overwrite=overwrite, only_failed=retry_failed)
         if dry_run:
             _print_plan(plan)
