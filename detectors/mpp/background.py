@@ -165,6 +165,7 @@ def score_cells(
     bins: NDArray[np.int16],
     background: Background,
     *,
+    fit_weight: float,
     texture_weight: float,
     texture_limit: float,
     low_price: float,
@@ -192,6 +193,7 @@ def score_cells(
         evidence,
         background.crown_height,
         background.crown_spread,
+        fit_weight,
         texture_weight * _THIN,
         low_price,
         void_price,
@@ -199,7 +201,7 @@ def score_cells(
 
 
 @njit(cache=True, nogil=True)
-def _score(height, state, bins, evidence, mean, spread, thin, low_price, void_price):  # type: ignore[no-untyped-def]
+def _score(height, state, bins, evidence, mean, spread, fit_weight, thin, low_price, void_price):  # type: ignore[no-untyped-def]
     rows, columns = state.shape
     score = np.full((rows, columns), -void_price, dtype=np.float32)
     level = -math.log(spread * math.sqrt(2.0 * math.pi))
@@ -216,5 +218,5 @@ def _score(height, state, bins, evidence, mean, spread, thin, low_price, void_pr
                 if best == -np.inf:
                     best = thin
                 log_crown = level - 0.5 * ((0.01 * height[r, c] - mean) / spread) ** 2
-                score[r, c] = best - max(log_crown, _HEIGHT_FLOOR)
+                score[r, c] = best - fit_weight * max(log_crown, _HEIGHT_FLOOR)
     return score

@@ -5,7 +5,8 @@ Nouns
 cell
     Square of the working grid (0.5 to 2 m); axis order (row, column), row 0 northernmost.
 height
-    Metres above ground of a point; of a cell, the mean of its high points in whole centimetres.
+    Metres above ground of a point; of a cell, the mean of the points near its top in whole centimetres, so that the
+    wall below a roof's edge does not count.
 state
     `VOID`: no point in or around the cell; `LOW`: most points below the low limit (ground, cars, hedges, and crowns
     that most pulses pass); `HIGH`: most points above it (roofs and closed crowns).
@@ -36,6 +37,8 @@ VOID, LOW, HIGH = np.uint8(0), np.uint8(1), np.uint8(2)
 
 #: Points higher above ground than this many metres are birds and clouds (the tallest building of 2025 has 828 m).
 _SKY = 900.0
+#: Points this many centimetres below the highest of a cell still belong to its top.
+_NEAR_TOP = 75
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,41 +113,45 @@ def make_cells(
     workers, bands
         Threads and the number of row bands the work is split into; neither changes the result.
     """
-    high = np.zeros(grid.shape, dtype=np.int32)
     total = np.zeros(grid.shape, dtype=np.int32)
-    rise = np.zeros(grid.shape, dtype=np.int32)
+    high = np.zeros(grid.shape, dtype=np.int32)
     many = np.zeros(grid.shape, dtype=np.int32)
+    top = np.zeros(grid.shape, dtype=np.int32)
+    near = np.zeros(grid.shape, dtype=np.int32)
+    rise = np.zeros(grid.shape, dtype=np.int32)
     returns = points.number_of_returns
     if returns is None:
         returns = np.empty(0, dtype=np.uint8)
     elevation = np.ascontiguousarray(ground.values, dtype=np.float32)
     place = (ground.grid.west, ground.grid.north, ground.grid.gsd)
     frame = (grid.west, grid.north, grid.gsd)
-    edges = np.linspace(0, grid.rows, bands + 1).astype(int)
+    lowest = math.floor(100 * low)
 
     def work(first: int, last: int) -> None:
-        _accumulate(
-            points.x, points.y, points.z, returns, elevation, place, frame, low, first, last, high, total, rise, many
-        )
+        x, y, z = points.x, points.y, points.z
+        heights, index = _above_ground(x, y, z, elevation, place, frame, first, last, *grid.shape)
+        _count(heights, index, returns, lowest, total.ravel(), high.ravel(), many.ravel(), top.ravel())
+        _add_top(heights, index, top.ravel(), near.ravel(), rise.ravel())
 
     if workers is None or bands == 1:
         work(0, grid.rows)
     else:
+        edges = np.linspace(0, grid.rows, bands + 1).astype(int)
         list(workers.map(work, edges[:-1].tolist(), edges[1:].tolist()))
-    height, state, openness = _summarise(high, total, rise, many)
+    height, state, openness = _summarise(total, high, many, near, rise)
     return Cells(grid, height, state, openness)
 
 
 @njit(cache=True, nogil=True)
-def _accumulate(  # type: ignore[no-untyped-def]
-    x, y, z, returns, ground, place, frame, low, first, last, high, total, rise, many
-):
-    """Add the points of rows first..last to the counts (all, high, part of a multiple return) and heights in cm."""
+def _above_ground(x, y, z, ground, place, frame, first, last, rows, columns):  # type: ignore[no-untyped-def]
+    """Return height in centimetres and flat cell of each point; cell -1 outside rows first..last and in the sky."""
     west, north, cell = frame
-    columns = high.shape[1]
-    rows_g, columns_g = ground.shape
     west_g, north_g, cell_g = place
+    rows_g, columns_g = ground.shape
+    heights = np.empty(len(x), dtype=np.int32)
+    index = np.empty(len(x), dtype=np.int32)
     for i in range(len(x)):
+        index[i] = -1
         row, column = (north - y[i]) / cell, (x[i] - west) / cell
         if not (first <= row < last and 0 <= column < columns):
             continue
@@ -156,19 +163,39 @@ def _accumulate(  # type: ignore[no-untyped-def]
         upper = ground[r0, c0] + right * (ground[r0, c1] - ground[r0, c0])
         lower = ground[r1, c0] + right * (ground[r1, c1] - ground[r1, c0])
         h = z[i] - (upper + down * (lower - upper))
-        if not h < _SKY:
-            continue
-        r, c = int(row), int(column)
-        total[r, c] += 1
-        if h > low:
-            high[r, c] += 1
-            rise[r, c] += int(round(h * 100.0))
-        if len(returns) > 0 and returns[i] > 1:
-            many[r, c] += 1
+        if h < _SKY and h > -_SKY:
+            index[i] = int(row) * columns + int(column)
+            heights[i] = int(math.floor(h * 100.0 + 0.5))
+    return heights, index
 
 
 @njit(cache=True, nogil=True)
-def _summarise(high, total, rise, many):  # type: ignore[no-untyped-def]
+def _count(heights, index, returns, low, total, high, many, top):  # type: ignore[no-untyped-def]
+    """Count all points, high ones and parts of multiple returns per cell, and find the top."""
+    for i in range(len(index)):
+        k = index[i]
+        if k < 0:
+            continue
+        total[k] += 1
+        if heights[i] > low:
+            high[k] += 1
+            top[k] = max(top[k], heights[i])
+        if len(returns) > 0 and returns[i] > 1:
+            many[k] += 1
+
+
+@njit(cache=True, nogil=True)
+def _add_top(heights, index, top, near, rise):  # type: ignore[no-untyped-def]
+    """Sum up the points near the top of their cell."""
+    for i in range(len(index)):
+        k = index[i]
+        if k >= 0 and top[k] > 0 and heights[i] >= top[k] - _NEAR_TOP:
+            near[k] += 1
+            rise[k] += heights[i]
+
+
+@njit(cache=True, nogil=True)
+def _summarise(total, high, many, near, rise):  # type: ignore[no-untyped-def]
     rows, columns = high.shape
     height = np.zeros((rows, columns), dtype=np.int32)
     state = np.zeros((rows, columns), dtype=np.uint8)
@@ -182,7 +209,7 @@ def _summarise(high, total, rise, many):  # type: ignore[no-untyped-def]
                 state[r, c] = LOW
                 continue
             state[r, c] = HIGH
-            height[r, c] = rise[r, c] // high[r, c]
+            height[r, c] = rise[r, c] // near[r, c]
             openness[r, c] = (255 * max(n - high[r, c], many[r, c])) // n
     for _ in range(2):
         _fill(height, state, openness)

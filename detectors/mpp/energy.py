@@ -52,6 +52,7 @@ class Model(NamedTuple):
     void_price: float
     least_side: float
     largest_side: float
+    fit_weight: float
 
 
 @njit(cache=True, nogil=True)
@@ -64,13 +65,13 @@ def own_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def]
         small,
         large,
         rectangle,
-        model.roof_price / model.weight,
+        model.roof_price / (model.weight * model.fit_weight),
         model.least_tau,
         model.least_height,
         model.cell,
         fit,
     )
-    return model.price - model.weight * (likelihood + score - model.void_price * outside)
+    return model.price - model.weight * (model.fit_weight * likelihood + score - model.void_price * outside)
 
 
 @njit(cache=True, nogil=True)

@@ -193,6 +193,50 @@ def _merge(small, large, model, window, rectangles, own, count, fixed, i):  # ty
 
 
 @njit(cache=True, nogil=True)
+def _replace(small, large, model, window, rectangles, own, fresh, count, fixed, boxes):  # type: ignore[no-untyped-def]
+    """Put boxes in the place of the buildings that they overlap where that lowers the energy; return gain and count."""
+    gained = 0.0
+    victims = np.empty(len(rectangles), dtype=np.int64)
+    for k in range(len(boxes)):
+        box = boxes[k]
+        if not _allowed(box, window, model):
+            continue
+        alone = own_energy(small, large, box, model)
+        if alone >= -_GAIN:
+            continue
+        many = 0
+        delta = alone + model.overlap * overlaps(fixed, len(fixed), box, -1, -1)
+        for i in range(count):
+            shared = overlaps(rectangles[i : i + 1], 1, box, -1, -1)
+            if shared <= 0.0:
+                continue
+            if shared * 4.0 < min(rectangles[i, 2] * rectangles[i, 3], box[2] * box[3]):
+                delta += model.overlap * shared
+                continue
+            victims[many] = i
+            many += 1
+        if many == 0:
+            continue
+        for v in range(many):
+            i = victims[v]
+            delta -= own[i] + model.overlap * _shared(rectangles, count, fixed, rectangles[i], i, -1)
+            # Overlap between two that go is counted with each: give one half back.
+            for w in range(many):
+                if w != v:
+                    j = victims[w]
+                    delta += 0.5 * model.overlap * overlaps(rectangles[j : j + 1], 1, rectangles[i], -1, -1)
+        if delta < -_GAIN:
+            gained -= delta
+            rectangles[victims[0]], own[victims[0]], fresh[victims[0]] = box, alone, True
+            for v in range(many - 1, 0, -1):
+                i = victims[v]
+                _remove(rectangles, own, count, i)
+                fresh[i] = fresh[count - 1]
+                count -= 1
+    return gained, count
+
+
+@njit(cache=True, nogil=True)
 def _remove(rectangles, own, count, j):  # type: ignore[no-untyped-def]
     rectangles[j], own[j] = rectangles[count - 1], own[count - 1]
 
@@ -238,6 +282,8 @@ def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps): 
                 fresh[count] = True
                 count += 1
                 gained -= delta
+        more, count = _replace(small, large, model, window, rectangles, own, fresh, count, fixed, boxes)
+        gained += more
         i = 0
         while i < count:
             if fresh[i]:

@@ -50,7 +50,7 @@ def to_grid_frame(quadrilaterals: NDArray[np.float64], grid: Grid) -> NDArray[np
     return np.concatenate([place.mean(axis=1), sides], axis=1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def row_span(dy, half_a, half_b, cos, sin):  # type: ignore[no-untyped-def]
     """Return the interval of x - centre x, inside the rectangle, of the line at y - centre y = dy; lo > hi when none.
 

@@ -31,59 +31,67 @@ FLAT, PLANE, GABLE_U, GABLE_V, HIP = 0, 1, 2, 3, 4
 #: Names of the roofs, by their number.
 KINDS = ("flat", "plane", "gable", "gable", "hip")
 
-#: A hip is tried where the gable along the longer side falls by at least this, metres per metre.
+#: A hip is tried where a gable won and that along the longer side falls by at least this, metres per metre.
 _STEEP = 0.12
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _first_cell(x):  # type: ignore[no-untyped-def]
-    """Index of the first cell whose centre is not left of x."""
-    return int(math.ceil(x - 0.5))
+    """Index of the first cell whose centre is not left of x, for x > -1e6 (a ceiling that compiles to one step)."""
+    return 1048576 - int(1048576.5 - x)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _add(small, large, row, first, last, sums, face):  # type: ignore[no-untyped-def]
+    """Add the cells first..last of a row to the whole-number sums of a face."""
+    n = np.int64(small[row, last, 0] - small[row, first, 0])
+    x = np.int64(small[row, last, 1] - small[row, first, 1])
+    h = np.int64(small[row, last, 2] - small[row, first, 2])
+    sums[face, 0] += n
+    sums[face, 1] += x
+    sums[face, 2] += row * n
+    sums[face, 3] += large[row, last, 0] - large[row, first, 0]
+    sums[face, 4] += row * x
+    sums[face, 5] += row * row * n
+    sums[face, 6] += h
+    sums[face, 7] += large[row, last, 1] - large[row, first, 1]
+    sums[face, 8] += row * h
+    sums[face, 9] += large[row, last, 2] - large[row, first, 2]
 
 
 @njit(cache=True, nogil=True)
-def _add(small, large, row, first, last, x0, y0, moments):  # type: ignore[no-untyped-def]
-    """Add the cells first..last of a row to moments about the cell (y0, x0); all sums stay whole."""
-    n = float(small[row, last, 0] - small[row, first, 0])
-    if n == 0.0:
-        return
-    x = float(small[row, last, 1] - small[row, first, 1])
-    h = float(small[row, last, 2] - small[row, first, 2])
-    y = float(row - y0)
-    xx = float(large[row, last, 0] - large[row, first, 0])
-    xh = float(large[row, last, 1] - large[row, first, 1])
-    moments[0] += n
-    moments[1] += x - x0 * n
-    moments[2] += y * n
-    moments[3] += xx - 2.0 * x0 * x + x0 * x0 * n
-    moments[4] += y * (x - x0 * n)
-    moments[5] += y * y * n
-    moments[6] += h
-    moments[7] += xh - x0 * h
-    moments[8] += y * h
-    moments[9] += float(large[row, last, 2] - large[row, first, 2])
+def _centre(sums, cx, cy, cos, sin, moments):  # type: ignore[no-untyped-def]
+    """Turn whole-number sums into moments along u and v about the centre, heights in metres.
 
-
-@njit(cache=True, nogil=True)
-def _rotate(moments, ox, oy, cos, sin):  # type: ignore[no-untyped-def]
-    """Turn whole-number moments about a cell into moments along u and v about the centre, heights in metres."""
-    for q in range(moments.shape[0]):
+    The origin is first moved to the cell of the centre in whole numbers, so that nothing depends on where the grid
+    begins.
+    """
+    x0, y0 = np.int64(math.floor(cx)), np.int64(math.floor(cy))
+    ox, oy = x0 + 0.5 - cx, y0 + 0.5 - cy
+    for q in range(sums.shape[0]):
+        count = sums[q, 0]
         m = moments[q]
-        n = m[0]
-        if n == 0.0:
+        if count == 0:
+            m[:] = 0.0
             continue
-        x, y, h = m[1] + ox * n, m[2] + oy * n, 0.01 * m[6]
-        xx = m[3] + 2.0 * ox * m[1] + ox * ox * n
-        yy = m[5] + 2.0 * oy * m[2] + oy * oy * n
-        xy = m[4] + ox * m[2] + oy * m[1] + ox * oy * n
-        xh, yh = 0.01 * m[7] + ox * h, 0.01 * m[8] + oy * h
-        m[1], m[2] = x * cos + y * sin, y * cos - x * sin
+        x_0, y_0 = sums[q, 1] - x0 * count, sums[q, 2] - y0 * count
+        xx_0 = sums[q, 3] - 2 * x0 * sums[q, 1] + x0 * x0 * count
+        yy_0 = sums[q, 5] - 2 * y0 * sums[q, 2] + y0 * y0 * count
+        xy_0 = sums[q, 4] - y0 * sums[q, 1] - x0 * sums[q, 2] + x0 * y0 * count
+        n, h = float(count), 0.01 * sums[q, 6]
+        x, y = x_0 + ox * n, y_0 + oy * n
+        xx = xx_0 + 2.0 * ox * x_0 + ox * ox * n
+        yy = yy_0 + 2.0 * oy * y_0 + oy * oy * n
+        xy = xy_0 + ox * y_0 + oy * x_0 + ox * oy * n
+        xh = 0.01 * (sums[q, 7] - x0 * sums[q, 6]) + ox * h
+        yh = 0.01 * (sums[q, 8] - y0 * sums[q, 6]) + oy * h
+        m[0], m[1], m[2] = n, x * cos + y * sin, y * cos - x * sin
         m[3] = xx * cos * cos + 2.0 * xy * cos * sin + yy * sin * sin
         m[4] = (yy - xx) * cos * sin + xy * (cos * cos - sin * sin)
         m[5] = xx * sin * sin - 2.0 * xy * cos * sin + yy * cos * cos
         m[6] = h
         m[7], m[8] = xh * cos + yh * sin, yh * cos - xh * sin
-        m[9] *= 1e-4
+        m[9] = 1e-4 * sums[q, 9]
 
 
 @njit(cache=True, nogil=True)
@@ -100,9 +108,10 @@ def scan(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
     rows, columns = small.shape[0], small.shape[1] - 1
     cx, cy, half_a, half_b = rectangle[0], rectangle[1], 0.5 * rectangle[2], 0.5 * rectangle[3]
     cos, sin = math.cos(rectangle[4]), math.sin(rectangle[4])
-    x0, y0 = int(math.floor(cx)), int(math.floor(cy))
-    moments[:] = 0.0
+    sums = np.zeros((4, 10), dtype=np.int64)
     score, outside = 0, 0
+    tangent = sin / cos if abs(cos) > 1e-12 else 1e12
+    cotangent = cos / sin if abs(sin) > 1e-12 else 1e12
     tall = half_a * abs(sin) + half_b * abs(cos)
     for row in range(_first_cell(cy - tall), _first_cell(cy + tall)):
         dy = row + 0.5 - cy
@@ -121,8 +130,7 @@ def scan(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
         if small[row, right, 0] == small[row, left, 0]:
             continue
         # Where the row crosses u = 0 and v = 0.
-        cut_u = -dy * sin / cos if abs(cos) > 1e-12 else np.inf
-        cut_v = dy * cos / sin if abs(sin) > 1e-12 else np.inf
+        cut_u, cut_v = -dy * tangent, dy * cotangent
         near, far = min(cut_u, cut_v), max(cut_u, cut_v)
         begin = left
         for part in range(3):
@@ -134,9 +142,9 @@ def scan(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
             if end > begin:
                 dx = 0.5 * (begin + end) - cx
                 q = (1 if dx * cos + dy * sin >= 0.0 else 0) + (2 if dy * cos - dx * sin >= 0.0 else 0)
-                _add(small, large, row, begin, end, x0, y0, moments[q])
+                _add(small, large, row, begin, end, sums, q)
                 begin = end
-    _rotate(moments, x0 + 0.5 - cx, y0 + 0.5 - cy, cos, sin)
+    _centre(sums, cx, cy, cos, sin, moments)
     return score / MILLI, float(outside)
 
 
@@ -150,8 +158,7 @@ def _scan_hip(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
     cx, cy, half_a, half_b = rectangle[0], rectangle[1], 0.5 * rectangle[2], 0.5 * rectangle[3]
     cos, sin = math.cos(rectangle[4]), math.sin(rectangle[4])
     ridge = half_a - half_b
-    x0, y0 = int(math.floor(cx)), int(math.floor(cy))
-    moments[:] = 0.0
+    sums = np.zeros((4, 10), dtype=np.int64)
     cuts = np.empty(6)
     tall = half_a * abs(sin) + half_b * abs(cos)
     for row in range(max(_first_cell(cy - tall), 0), min(_first_cell(cy + tall), rows)):
@@ -188,9 +195,9 @@ def _scan_hip(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
                 dx = 0.5 * (begin + end) - cx
                 u, v = dx * cos + dy * sin, dy * cos - dx * sin
                 face = (1 if v >= 0.0 else 0) if abs(u) - ridge <= abs(v) else (3 if u >= 0.0 else 2)
-                _add(small, large, row, begin, end, x0, y0, moments[face])
+                _add(small, large, row, begin, end, sums, face)
                 begin = end
-    _rotate(moments, x0 + 0.5 - cx, y0 + 0.5 - cy, cos, sin)
+    _centre(sums, cx, cy, cos, sin, moments)
 
 
 @njit(cache=True, nogil=True)
@@ -254,7 +261,9 @@ def fit_roof(small, large, rectangle, roof_price, least_tau, least_height, cell,
     """
     q = np.empty((4, 10))
     score, outside = scan(small, large, rectangle, q)
-    total = q[0] + q[1] + q[2] + q[3]
+    total = np.empty(10)
+    for k in range(10):
+        total[k] = q[0, k] + q[1, k] + q[2, k] + q[3, k]
     n = total[0]
     fit[:] = 0.0
     fit[2] = least_tau
@@ -284,7 +293,7 @@ def fit_roof(small, large, rectangle, roof_price, least_tau, least_height, cell,
         if value > best:
             best, residual, kind, slope = value, along_v, GABLE_V, slope_v / cell
         steep = (slope_u if rectangle[2] >= rectangle[3] else slope_v) / cell
-        if steep > _STEEP and residual > n * least_tau * least_tau:
+        if kind >= GABLE_U and steep > _STEEP and residual > n * least_tau * least_tau:
             trial, slope_h = _hip_residual(small, large, rectangle, q, n, total[6], level)
             value = log_likelihood(n, trial, least_tau) - roof_price
             if value > best:
