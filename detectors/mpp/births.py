@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .random_stream import integer, uniform
+from .random_stream import uniform
 
 __all__ = ["Births", "birth_density", "make_births", "propose_birth"]
 

@@ -49,9 +49,7 @@ def propose_boxes(
         Smaller patches and pieces are left out.
     """
     roof = (state == HIGH) & (score > 0)
-    found = [
-        _boxes(*label_patches(height, roof, round(100 * step)), least_cells) for step in steps
-    ]
+    found = [_boxes(*label_patches(height, roof, round(100 * step)), least_cells) for step in steps]
     boxes = np.concatenate(found) if found else np.empty((0, 5))
     return boxes[np.sort(np.unique(np.round(boxes, 3), axis=0, return_index=True)[1])]
 

@@ -39,6 +39,8 @@ VOID, LOW, HIGH = np.uint8(0), np.uint8(1), np.uint8(2)
 _SKY = 900.0
 #: Points this many centimetres below the highest of a cell still belong to its top.
 _NEAR_TOP = 75
+#: A height that differs by more than this many centimetres from all its neighbours is a spike.
+_SPIKE = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +167,7 @@ def _above_ground(x, y, z, ground, place, frame, first, last, rows, columns):  #
         h = z[i] - (upper + down * (lower - upper))
         if h < _SKY and h > -_SKY:
             index[i] = int(row) * columns + int(column)
-            heights[i] = int(math.floor(h * 100.0 + 0.5))
+            heights[i] = math.floor(h * 100.0 + 0.5)
     return heights, index
 
 
@@ -211,9 +213,32 @@ def _summarise(total, high, many, near, rise):  # type: ignore[no-untyped-def]
             state[r, c] = HIGH
             height[r, c] = rise[r, c] // near[r, c]
             openness[r, c] = (255 * max(n - high[r, c], many[r, c])) // n
+    _despike(height, state, openness)
     for _ in range(2):
         _fill(height, state, openness)
     return height, state, openness
+
+
+@njit(cache=True, nogil=True)
+def _despike(height, state, openness):  # type: ignore[no-untyped-def]
+    """Empty the high cells whose height no neighbour shares to 2 m: birds, masts, chimneys, errors of the sensor."""
+    rows, columns = state.shape
+    before = state.copy()
+    for r in range(rows):
+        for c in range(columns):
+            if before[r, c] != HIGH:
+                continue
+            shared = False
+            for i in range(max(r - 1, 0), min(r + 2, rows)):
+                for j in range(max(c - 1, 0), min(c + 2, columns)):
+                    if (i != r or j != c) and before[i, j] == HIGH and abs(height[i, j] - height[r, c]) <= _SPIKE:
+                        shared = True
+            if not shared:
+                state[r, c] = VOID
+    for r in range(rows):
+        for c in range(columns):
+            if state[r, c] == VOID:
+                height[r, c], openness[r, c] = 0, 0
 
 
 @njit(cache=True, nogil=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
@@ -23,7 +22,7 @@ from ...scenes.parameters import parameter
 from ...scenes.points import PointCloud
 from ...scenes.raster import Elevation, Grid
 from ...scenes.scene import Scene
-from ..base import Detector, Step
+from ..base import Detector
 from .annealing import Annealed, Schedule, anneal
 from .background import Background, estimate_background, score_cells
 from .candidates import propose_boxes
@@ -115,9 +114,7 @@ class MPP(Detector):
         0.9, minimum=0, maximum=0.99, doc="share of births proposed by the data; 0: uniform", swept=(0, 0.5, 0.9)
     )
     start: str = parameter("greedy", choices=("greedy", "empty"), doc="first state of the chain")
-    effort: float = parameter(
-        1.0, minimum=0, doc="factor of the number of proposals", swept=(0, 0.25, 1, 4)
-    )
+    effort: float = parameter(1.0, minimum=0, doc="factor of the number of proposals", swept=(0, 0.25, 1, 4))
     hot: float = parameter(3.0, minimum=1e-3, doc="first temperature", swept=(1, 3, 10, 30))
     cold: float = parameter(0.1, minimum=1e-4, doc="last temperature")
     intensity: float = parameter(
@@ -206,9 +203,7 @@ class MPP(Detector):
             boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
         return Prepared(cells, background, score, tables, model, boxes, weights)
 
-    def _sample(
-        self, prepared: Prepared, seed: int, pool: ThreadPoolExecutor
-    ) -> tuple[_Rectangles, list[Annealed]]:
+    def _sample(self, prepared: Prepared, seed: int, pool: ThreadPoolExecutor) -> tuple[_Rectangles, list[Annealed]]:
         """Anneal every tile, then polish the seams."""
         grid, model, tables = prepared.cells.grid, prepared.model, prepared.tables
         cell = grid.gsd

@@ -18,7 +18,7 @@ from numba import njit
 from .rectangles import overlap_area
 from .roofs import fit_roof
 
-__all__ = ["Model", "configuration_energy", "own_energy", "overlaps"]
+__all__ = ["Model", "configuration_energy", "overlaps", "own_energy"]
 
 
 class Model(NamedTuple):

@@ -127,8 +127,11 @@ def _split(small, large, model, window, rectangles, own, count, fixed, i):  # ty
     _part(parent, best_axis, best_at, 0.5 * side, second)
     before = own[i] + model.overlap * _shared(rectangles, count, fixed, parent, i, -1)
     one, two = own_energy(small, large, first, model), own_energy(small, large, second, model)
-    after = one + two + model.overlap * (
-        _shared(rectangles, count, fixed, first, i, -1) + _shared(rectangles, count, fixed, second, i, -1)
+    after = (
+        one
+        + two
+        + model.overlap
+        * (_shared(rectangles, count, fixed, first, i, -1) + _shared(rectangles, count, fixed, second, i, -1))
     )
     pair = np.empty((1, 5))
     pair[0] = first
@@ -178,9 +181,14 @@ def _merge(small, large, model, window, rectangles, own, count, fixed, i):  # ty
         alone = own_energy(small, large, merged, model)
         if alone >= own[i] + own[j] + model.overlap * filled - _GAIN:
             continue
-        before = own[i] + own[j] + model.overlap * (
-            _shared(rectangles, count, fixed, rectangles[i], i, -1)
-            + _shared(rectangles, count, fixed, rectangles[j], i, j)
+        before = (
+            own[i]
+            + own[j]
+            + model.overlap
+            * (
+                _shared(rectangles, count, fixed, rectangles[i], i, -1)
+                + _shared(rectangles, count, fixed, rectangles[j], i, j)
+            )
         )
         gain = before - alone - model.overlap * _shared(rectangles, count, fixed, merged, i, j)
         if gain > best_gain:

@@ -19,7 +19,8 @@ __all__ = ["gaussian", "integer", "stream", "uniform"]
 
 def stream(entropy: Sequence[int]) -> NDArray[np.uint64]:
     """Return the state, shape (4,), of the stream that belongs to whole numbers such as (seed, column, row)."""
-    return np.random.SeedSequence([int(number) for number in entropy]).generate_state(4, np.uint64)
+    words = np.random.SeedSequence([int(number) for number in entropy]).generate_state(4, np.uint64)
+    return words.astype(np.uint64)
 
 
 @njit(cache=True, nogil=True, inline="always")

@@ -13,7 +13,6 @@ rectangle
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import njit
@@ -120,9 +119,3 @@ def overlap_area(first, second):  # type: ignore[no-untyped-def]
         j = (i + 1) % n
         area += p[now, i, 0] * p[now, j, 1] - p[now, j, 0] * p[now, i, 1]
     return 0.5 * abs(area)
-
-
-def same_shape(first: Any, second: Any) -> bool:
-    """Return whether two rectangles cover the same ground to 1e-9 cells squared."""
-    area = float(overlap_area(np.asarray(first, float), np.asarray(second, float)))
-    return abs(area - first[2] * first[3]) < 1e-9 and abs(area - second[2] * second[3]) < 1e-9

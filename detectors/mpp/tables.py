@@ -62,18 +62,19 @@ def make_tables(height: NDArray[np.int32], high: NDArray[np.bool_], score: NDArr
 @njit(cache=True, nogil=True)
 def _sum_rows(height, high, score, small, large):  # type: ignore[no-untyped-def]
     rows, columns = height.shape
+    one = np.int64(1)
     for r in range(rows):
         n, nx, nh, points = 0, 0, 0, 0
-        nxx, nxh, nhh = np.int64(0), np.int64(0), np.int64(0)
+        nxx, nxh, nhh = 0 * one, 0 * one, 0 * one
         for c in range(columns):
             if high[r, c]:
-                h = np.int64(height[r, c])
+                h = height[r, c] * one
                 n += 1
                 nx += c
                 nh += h
                 nxx += c * c
                 nxh += c * h
                 nhh += h * h
-            points += int(round(score[r, c] * MILLI))
+            points += round(score[r, c] * MILLI)
             small[r, c + 1, 0], small[r, c + 1, 1], small[r, c + 1, 2], small[r, c + 1, 3] = n, nx, nh, points
             large[r, c + 1, 0], large[r, c + 1, 1], large[r, c + 1, 2] = nxx, nxh, nhh
