@@ -261,6 +261,7 @@ class Leaderboard:
         grouped = any(entry.group for entry in self.entries)
         header = ["rank", *(["group"] if grouped else []), "detector", "over", "scenes"]
         header += [column_title(index) for index in self.indices]
+        header.append(f"{self.rank_by.symbol or self.rank_by.title} 95 %")
         header += ["objects", "CPU s", "MB"]
         rows = []
         for entry in self.entries:
@@ -272,6 +273,9 @@ class Leaderboard:
                 text = format_cell(cell.value, index.unit)
                 partial = entry.pooling == "mean" and cell.scenes < entry.scenes
                 row.append(f"{text} ({cell.scenes})".strip() if partial else text)
+            ranked = entry.cells[self.rank_by.key]
+            bounds = [format_cell(bound, self.rank_by.unit) for bound in (ranked.low, ranked.high)]
+            row.append("–".join(bounds) if ranked.low is not None else "")
             row.append(f"{entry.detected}/{entry.reference}")
             row.append("" if entry.cpu_seconds is None else f"{entry.cpu_seconds:.2f}")
             row.append("" if not entry.peak_memory else f"{entry.peak_memory / 1e6:.0f}")

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from ...scenes.errors import RoofbenchError
-from . import detect, evaluate, run, runs, scenes
+from . import detect, evaluate, gate, run, runs, scenes, sweep
 
 __all__ = ["app", "main"]
 
@@ -29,6 +29,9 @@ app = typer.Typer(
 app.command("evaluate")(evaluate.evaluate)
 app.command("run")(run.run)
 app.command("detect")(detect.detect)
+app.command("sweep")(sweep.sweep)
+app.add_typer(gate.baseline_app)
+app.command("gate")(gate.gate)
 app.command("score")(runs.score)
 app.command("ls")(runs.ls)
 app.command("why")(runs.why)

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from .options import DEFAULT_STORE, PluginOption, StoreOption, load_plugins
+from .options import DEFAULT_STORE, PluginOption, StoreOption, load_plugins, table_console
 
 _COLUMNS = ("id", "key", "status", "label", "scene", "seed", "detected", "seconds", "cpu_seconds", "peak_memory")
 
@@ -115,8 +115,6 @@ def score(
     plugin: PluginOption = None,
 ) -> None:
     """Judge stored detections by further evaluators and print their leaderboards; nothing is detected again."""
-    from rich.console import Console
-
     from ...evaluators.registry import make_evaluator
     from ..leaderboard import make_leaderboard
     from ..plan import Judge
@@ -135,7 +133,7 @@ def score(
                     score_stored(opened, run_id, (judge,))
         for judge in judges:
             board = make_leaderboard(rows, opened, judge, title=f"Stored runs of {store}", rank_by=rank_by)
-            board.print(Console(highlight=False, width=None if sys.stdout.isatty() else 160))
+            board.print(table_console())
     if not good:
         raise typer.Exit(4)
 
