@@ -150,7 +150,7 @@ class Baseline:
             if content["format"] != _FORMAT:
                 raise InputError(f"{file}: baseline of format {content['format']}, this roofbench knows {_FORMAT}")
             return cls._from(content)
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             if isinstance(error, InputError):
                 raise
             raise InputError(f"{file} is no baseline: {type(error).__name__}: {error}") from error

@@ -114,7 +114,7 @@ def compare(
             failures += [
                 f"{label} on {scene}, seed {seed}"
                 for (scene, seed), values in before.runs.items()
-                if values is not None and after.runs.get((scene, seed)) is None
+                if values is not None and after.runs.get((scene, seed), values) is None
             ]
     return GateResult(
         baseline=str(baseline.version),
