@@ -120,4 +120,3 @@ class StoredScene:
     area: shapely.Geometry | None
     reference: Footprints | None
     facts: Mapping[str, Any]
-    point_count: int | None

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..scenes.errors import UnsupportedError
 from ..scenes.scene import Scene
-from .dispatch import Dispatcher
-from .executors import InProcess, Slot, cluster_slot, local_slots
+from .executors import InProcess, cluster_executor, local_executor
 from .isolation import Limits, call_isolated
 from .plan import Judge, Overwrite, Plan, PlannedRun, scene_recipe
 from .provenance import code_version
@@ -24,6 +23,9 @@ from .tasks import Outcome, Score, Task
 from .worker import execute
 
 __all__ = ["Execution", "RunResult", "run_plan", "score_stored"]
+
+#: Tasks handed to an executor beyond its workers, so that no worker waits for the store.
+_AHEAD = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,13 +146,12 @@ def _outcomes(
     described = store.described_scenes()
     evaluators = tuple(judge.recipe for judge in plan.judges)
     with ExitStack() as stack:
-        slots = stack.enter_context(_slots(execution, len(runs)))
-        elsewhere = execution.jobs > 0 or execution.scheduler is not None
+        executor, workers = stack.enter_context(_executor(execution, len(runs)))
+        elsewhere = not isinstance(executor, InProcess)
         scenes = _Scenes(stack, elsewhere=elsewhere)
-        dispatcher, flying = Dispatcher(runs), dict[Future[bytes], tuple[PlannedRun, Slot]]()
-        free = [slot for slot in slots for _ in range(slot.capacity)]
+        waiting, flying = iter(runs), dict[Future[bytes], PlannedRun]()
         while True:
-            while free and (run := dispatcher.next_for(free[0])) is not None:
+            while len(flying) < workers + _AHEAD and (run := next(waiting, None)) is not None:
                 if overwrite != "always" and _is_stored(store, run):
                     continue
                 task = Task(
@@ -160,29 +161,32 @@ def _outcomes(
                     evaluators=evaluators,
                     describe_scene=run.identity.scene_key not in described,
                 )
-                slot = free.pop(0)
                 if elsewhere:
                     _must_be_portable(run)
-                    future = slot.executor.submit(call_isolated, task.to_json(), execution.limits)
+                    flying[executor.submit(call_isolated, task.to_json(), execution.limits)] = run
                 else:
-                    future = slot.executor.submit(_in_process, run, task, plan)
-                flying[future] = run, slot
+                    outcome = _in_process(run, task, plan)
+                    _note_description(described, run, outcome)
+                    yield run, outcome
             if not flying:
                 return
             finished, _ = wait(flying, return_when=FIRST_COMPLETED)
             for future in finished:
-                run, slot = flying.pop(future)
-                free.append(slot)
+                run = flying.pop(future)
                 outcome = _outcome(future)
-                if outcome.scene is not None:
-                    described.add(run.identity.scene_key)
+                _note_description(described, run, outcome)
                 yield run, outcome
 
 
-def _in_process(run: PlannedRun, task: Task, plan: Plan) -> bytes:
+def _note_description(described: set[str], run: PlannedRun, outcome: Outcome) -> None:
+    if outcome.scene is not None:
+        described.add(run.identity.scene_key)
+
+
+def _in_process(run: PlannedRun, task: Task, plan: Plan) -> Outcome:
     scene = run.scene if isinstance(run.scene, Scene) else None
     evaluators = [judge.evaluator for judge in plan.judges]
-    return execute(task, scene=scene, detector=run.entrant.detector, evaluators=evaluators).to_bytes()
+    return execute(task, scene=scene, detector=run.entrant.detector, evaluators=evaluators)
 
 
 def _outcome(future: Future[bytes]) -> Outcome:
@@ -223,14 +227,15 @@ class _Scenes:
 
 
 @contextmanager
-def _slots(execution: Execution, tasks: int) -> Iterator[list[Slot]]:
+def _executor(execution: Execution, tasks: int) -> Iterator[tuple[Executor, int]]:
     if execution.scheduler is not None:
         if execution.jobs == 0:
             raise UnsupportedError("jobs=0 runs in this process and cannot be combined with a scheduler")
-        with cluster_slot(execution.scheduler) as slot:
-            yield [slot]
+        with cluster_executor(execution.scheduler) as pair:
+            yield pair
     elif execution.jobs == 0:
-        yield [Slot(InProcess(), 1)]
+        yield InProcess(), 1
     else:
-        with local_slots(min(execution.jobs, tasks)) as slots:
-            yield slots
+        workers = min(execution.jobs, tasks)
+        with local_executor(workers) as executor:
+            yield executor, workers

@@ -42,6 +42,9 @@ __all__ = ["NDSM"]
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
 
+#: Colour tells less than the laser: roofs may be green, autumn trees are not, and roofs lean in the image.
+_IMAGE_WEIGHT = 0.5
+
 
 @dataclass(frozen=True, kw_only=True)
 class NDSM(Detector):
@@ -103,7 +106,7 @@ class NDSM(Detector):
     )
     largest_hole: float = parameter(4.0, unit="m2", minimum=0, doc="holes up to this area are filled")
     most_tree_like: float = parameter(
-        -0.5, minimum=-1, maximum=1, doc="footprints whose cells look more like a tree on average are dropped"
+        -0.4, minimum=-1, maximum=1, doc="footprints whose cells look more like a tree on average are dropped"
     )
     smallest_area: float = parameter(8.0, unit="m2", minimum=0, doc="smaller footprints are dropped")
     outline: Literal["polygon", "rectangle"] = parameter(
@@ -158,22 +161,22 @@ class NDSM(Detector):
 
     def _tree_likeness(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> _Floats:
         """Return the mean of what the cues say: -1 roof, +1 tree, NaN where none says anything."""
-        said = []
-        for value, threshold, width in (
-            (cues.multiple_share, self.multiple_share, 0.25),
-            (cues.roughness, self.roughness, 0.2),
-            (cues.penetration, self.penetration, 0.15),
-            (*(vegetation or (None, None)), 0.05),
-        ):
-            if value is not None and threshold is not None:
-                said.append(np.clip((value - np.float32(threshold)) / np.float32(width), -1, 1))
+        cues_used: tuple[tuple[_Floats | None, float | None, float, float], ...] = (
+            (cues.multiple_share, self.multiple_share, 0.25, 1.0),
+            (cues.roughness, self.roughness, 0.2, 1.0),
+            (cues.penetration, self.penetration, 0.15, 1.0),
+            (*(vegetation or (None, None)), 0.05, _IMAGE_WEIGHT),
+        )
         total = np.zeros(cues.grid.shape, dtype=np.float32)
-        count = np.zeros(cues.grid.shape, dtype=np.float32)
-        for cue in said:
-            told = np.isfinite(cue)
-            total += np.where(told, cue, 0)
-            count += told
-        return np.where(count > 0, total / np.maximum(count, 1), np.float32(np.nan))
+        weights = np.zeros(cues.grid.shape, dtype=np.float32)
+        for value, threshold, width, weight in cues_used:
+            if value is None or threshold is None:
+                continue
+            said = np.clip((value - np.float32(threshold)) / np.float32(width), -1, 1)
+            told = np.isfinite(said)
+            total += np.where(told, np.float32(weight) * said, 0)
+            weights += np.float32(weight) * told
+        return np.where(weights > 0, total / np.where(weights > 0, weights, 1), np.float32(np.nan))
 
     def _clean(self, roof: _Mask, cell: float) -> _Mask:
         """Fill small holes and open."""
@@ -191,15 +194,15 @@ class NDSM(Detector):
         self, traced: NDArray[np.object_], cues: CellCues, likeness: _Floats, crs: str | None
     ) -> Footprints:
         height, looks = _means_inside(traced, cues.grid, cues.height, likeness)
-        # Where no cue says anything the mean is NaN, and the footprint stays.
-        keep = ~(looks > self.most_tree_like) & (shapely.area(traced) >= self.smallest_area)
         if self.outline == "rectangle":
-            polygons = minimum_rectangles(traced[keep])
+            polygons = minimum_rectangles(traced)
         else:
             tolerance = max(cues.grid.gsd, 0.5) if self.tolerance is None else self.tolerance
-            polygons = regularise(traced[keep], tolerance)
+            polygons = regularise(traced, tolerance)
+        # Where no cue says anything the mean is NaN, and the footprint stays.
+        keep = ~(looks > self.most_tree_like) & (shapely.area(polygons) >= self.smallest_area)
         attributes = {"height": height[keep], "tree_likeness": looks[keep]}
-        return Footprints.of(polygons, crs=crs, attributes=attributes, source=self.name)
+        return Footprints.of(polygons[keep], crs=crs, attributes=attributes, source=self.name)
 
 
 @dataclass(frozen=True, eq=False)

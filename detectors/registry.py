@@ -18,7 +18,6 @@ DETECTORS = Registry(
         "improved": "detectors.lines.improved:Improved",
         "ndsm": "detectors.ndsm:NDSM",
         "original": "detectors.lines.original:Original",
-        "mpp": "detectors.mpp.detector:MPP",
     },
 )
 

@@ -12,8 +12,8 @@ wall
 
 The filter is a progressive opening with growing windows and a height threshold that grows with the window (Zhang et
 al. 2003, "A progressive morphological filter for removing nonground measurements from airborne LIDAR data", IEEE TGRS
-41(4); Pingel, Clarke & McBride 2013, "An improved simple morphological filter", ISPRS J. 77), taken relative to a
-robust plane, so that a uniform slope costs nothing, with the test for walls added, so that windows as wide as the
+41(4); Pingel, Clarke & McBride 2013, "An improved simple morphological filter", ISPRS J. 77), taken relative to the
+coarse trend of the land, so that a slope costs nothing, with the test for walls added, so that windows as wide as the
 largest halls do not cut hills. Axis order of grids: (row, column), row 0 northernmost.
 """
 
@@ -37,10 +37,12 @@ _Mask = NDArray[np.bool_]
 #: Points in height within this many metres of a cell's lowest point support it, itself included; how many must, and
 #: which share of the points around.
 _SUPPORT_HEIGHT, _SUPPORT, _SUPPORT_SHARE = 1.0, 3, 0.05
+#: Size in metres of the blocks whose lowest heights tell the trend.
+_TREND_BLOCK = 5.0
 #: Windows up to this radius in metres remove what they remove, walls or not: shrubs and crowns have ragged borders.
 _NARROW = 6.0
 #: Share of the border of a wide object that must be wall.
-_WALLED = 0.4
+_WALLED = 0.7
 
 
 def ground_surface(
@@ -66,7 +68,7 @@ def ground_surface(
     largest_object : float
         Width in metres up to which an object is taken off the ground.
     slope : float
-        Rise over run, besides that of the whole scene, that is still ground.
+        Rise over run, besides that of the trend, that is still ground.
     wall_height : float
         Least step, metres, at the border of an object.
     tolerance : float
@@ -82,8 +84,8 @@ def ground_surface(
     lowest = lowest_surface(x, y, z, grid)
     if np.isnan(lowest).all():
         return Elevation(lowest, grid)
-    plane = _robust_plane(lowest)
-    relief = lowest - plane
+    trend = _trend(lowest, grid.gsd, largest_object)
+    relief = lowest - trend
     objects = _objects(fill_unknown(relief), grid.gsd, largest_object, slope, wall_height)
     ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
     # Cut hill tops and the feet of shrubs come back; what they add lets the next round reach a little further.
@@ -93,7 +95,7 @@ def ground_surface(
             break
         objects &= ~again
         ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
-    return _averaged(x, y, z, grid, ground + plane, tolerance)
+    return _averaged(x, y, z, grid, ground + trend, tolerance)
 
 
 def elevation_from_points(points: PointCloud, extent: Sequence[float], *, cell: float | None = None) -> Elevation:
@@ -255,27 +257,57 @@ def _finite(points: PointCloud) -> tuple[NDArray[np.float64], NDArray[np.float64
     return points.x[finite], points.y[finite], points.z[finite]
 
 
-def _robust_plane(surface: _Floats) -> _Floats:
-    """Return a plane through the low part of a surface, on its grid: what lies above it counts less each round."""
-    rows, columns = np.nonzero(np.isfinite(surface))
-    heights = surface[rows, columns].astype(np.float64)
-    scale = float(max(surface.shape))
-    design = np.column_stack([np.ones(len(heights)), rows / scale, columns / scale])
-    weights = np.ones(len(heights))
-    coefficients = np.zeros(3)
-    for _ in range(8):
-        root = np.sqrt(weights)[:, None]
-        coefficients = np.linalg.lstsq(design * root, heights * root[:, 0], rcond=None)[0]
-        residual = heights - design @ coefficients
-        spread = 1.4826 * np.median(np.abs(residual)) + 0.1
-        weights = np.where(
-            residual > 0, 1 / (1 + (residual / (0.5 * spread)) ** 2), 1 / (1 + (residual / (2 * spread)) ** 2)
-        )
-    row, column = np.indices(surface.shape, dtype=np.float32)
-    plane: _Floats = (coefficients[0] + coefficients[1] / scale * row + coefficients[2] / scale * column).astype(
-        np.float32
-    )
-    return plane
+def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
+    """Return the coarse lie of the land: local planes, fitted to the low parts of a surface, on its grid.
+
+    Locally weighted regression over ever smaller neighbourhoods; what lies above the trend counts less each round, so
+    that an object narrower than `largest` (metres) does not lift it. A hill does: its flanks lead up to its top.
+    """
+    block = max(1, round(_TREND_BLOCK / cell))
+    rows, columns = (-(-size // block) for size in surface.shape)
+    padded = np.full((rows * block, columns * block), np.inf, dtype=np.float32)
+    padded[: surface.shape[0], : surface.shape[1]] = np.where(np.isnan(surface), np.float32(np.inf), surface)
+    low = padded.reshape(rows, block, columns, block).min(axis=(1, 3)).astype(np.float64)
+    known = np.isfinite(low)
+    base = low[known].min()
+    height = np.where(known, low - base, 0)
+    weight = known.astype(np.float64)
+    trend = np.zeros(low.shape)
+    for share in (1.0, 1.0, 0.5, 0.5, 0.25, 0.25, 0.25):
+        trend = _local_planes(height, weight, share * largest / (cell * block))
+        above = height - trend
+        spread = 1.4826 * np.median(np.abs(above[known])) + 0.1
+        weight = known / (1 + (np.where(above > 0, 2, 0.5) * above / spread) ** 2)
+    # Samples at the border lie beyond the centres of the outer blocks.
+    outer = np.pad(trend, 1, mode="reflect", reflect_type="odd") if min(trend.shape) > 1 else np.pad(trend, 1, "edge")
+    row, column = np.indices(surface.shape)
+    blocks = Elevation(outer.astype(np.float32), Grid(-block, block, block, rows + 2, columns + 2))
+    lie: _Floats = (blocks.sample(column + 0.5, -row - 0.5) + base).astype(np.float32)
+    return lie
+
+
+def _local_planes(height: NDArray[np.float64], weight: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+    """Return at each cell the value of the weighted least-squares plane of its Gaussian neighbourhood."""
+    import cv2
+
+    place: NDArray[np.float64] = np.indices(height.shape, dtype=np.float64)
+    y, x = place[0], place[1]
+
+    def blurred(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT))
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return blurred(weight * values) / total
+
+    total = np.maximum(blurred(weight), 1e-12)
+    mx, my, mz = mean(x), mean(y), mean(height)
+    # A little of the neighbourhood's own spread keeps the slope defined where all weight is on one line.
+    ridge = 1e-3 * sigma**2
+    xx, yy, xy = mean(x * x) - mx * mx + ridge, mean(y * y) - my * my + ridge, mean(x * y) - mx * my
+    xz, yz = mean(x * height) - mx * mz, mean(y * height) - my * mz
+    determinant = xx * yy - xy * xy
+    across, down = (xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant
+    return np.asarray(mz + across * (x - mx) + down * (y - my))
 
 
 def _objects(relief: _Floats, cell: float, largest: float, slope: float, wall_height: float) -> _Mask:
@@ -283,14 +315,18 @@ def _objects(relief: _Floats, cell: float, largest: float, slope: float, wall_he
     import cv2
 
     objects = np.zeros(relief.shape, dtype=bool)
-    walls = _wall_cells(relief, wall_height)
-    surface = relief
+    surface, walls = relief, None
     for radius in _radii(largest / 2 / cell, min(relief.shape)):
+        if radius * cell > _NARROW and walls is None:
+            # Narrower windows have taken the trees off: what steps down in the surface between them is a roof.
+            walls = _wall_cells(surface, wall_height)
         window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * radius + 1, 2 * radius + 1))
         opened = cv2.morphologyEx(surface, cv2.MORPH_OPEN, window)
         removed = surface - opened > np.minimum(0.3 + slope * radius * cell, 2.0)
-        if radius * cell > _NARROW:
-            removed = _standing(removed | objects, walls, objects)
+        if walls is not None:
+            removed = _standing(removed, walls)
+            # The rest of a roof of which a wing is gone stands on the cut, too.
+            walls |= cv2.dilate(removed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         objects |= removed
         surface = np.where(removed, opened, surface)
     return objects
@@ -319,8 +355,8 @@ def _wall_cells(relief: _Floats, height: float) -> _Mask:
     return np.asarray(fall - rise / 2 > height)
 
 
-def _standing(removed: _Mask, walls: _Mask, objects: _Mask) -> _Mask:
-    """Return the removed cells of the regions that were objects before or whose border is wall."""
+def _standing(removed: _Mask, walls: _Mask) -> _Mask:
+    """Return the removed cells of the regions whose border is wall."""
     import cv2
 
     count, labels = cv2.connectedComponents(removed.astype(np.uint8), connectivity=4)
@@ -329,8 +365,7 @@ def _standing(removed: _Mask, walls: _Mask, objects: _Mask) -> _Mask:
     length = np.bincount(labels[border], minlength=count)
     walled = np.bincount(labels[border & walls], minlength=count)
     stands = walled >= _WALLED * np.maximum(length, 1)
-    stands[0] = False
-    return np.asarray(removed & (stands[labels] | objects))
+    return np.asarray(removed & stands[labels])
 
 
 def _averaged(

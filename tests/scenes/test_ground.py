@@ -1,6 +1,8 @@
 import naive_ground
 import numpy as np
 import pytest
+from shapely import box, contains_xy
+from shapely.affinity import rotate
 
 from roofbench.scenes.ground import elevation_from_points, fill_unknown, ground_surface, lowest_surface
 from roofbench.scenes.points import PointCloud
@@ -52,6 +54,29 @@ def test_a_hall_as_wide_as_the_largest_object_is_taken_off_whole():
     points, truth = town(flat, [(1030, 2015, 1120, 2105, 9.0)])
     error = ground_surface(points, EXTENT, largest_object=100).sample(points.x, points.y) - truth
     assert np.abs(error).max() < 0.3
+
+
+def test_a_large_building_at_an_angle_is_taken_off_although_windows_fit_its_middle_first():
+    # A tower block of 52 x 40 m turned by 27 degrees: each window reaches further into its corners.
+    points, truth = town(flat)
+    block = rotate(box(1050, 2040, 1102, 2080), 27)
+    inside = contains_xy(block, points.x, points.y)
+    points.z[inside] += 17
+    error = ground_surface(points, EXTENT).sample(points.x, points.y) - truth
+    assert np.abs(error).max() < 0.3
+
+
+def test_steep_wooded_hills_are_not_cut_off():
+    def hills(x, y):
+        return 10 * np.sin(x / 18) * np.cos(y / 22)
+
+    points, truth = town(hills, density=2)
+    rng = np.random.default_rng(5)
+    crowns = rng.uniform([1000, 2000], [1160, 2120], (150, 2))
+    near = np.min((points.x[:, None] - crowns[:, 0]) ** 2 + (points.y[:, None] - crowns[:, 1]) ** 2, axis=1) < 9
+    points.z[near] += rng.uniform(0, 12, near.sum())
+    error = np.abs(ground_surface(points, EXTENT).sample(points.x, points.y) - truth)
+    assert np.mean(error > 1) < 0.05
 
 
 def test_low_outliers_and_birds_do_not_move_the_ground():
