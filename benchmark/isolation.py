@@ -84,12 +84,12 @@ class IsolatedProcess:
                 used = _resident(process.pid) if limits.memory is not None else 0
                 peak = max(peak, used)
                 if deadline is not None and time.monotonic() > deadline:
-                    return self._failed(f"time limit of {limits.seconds:g} s passed", started, peak)
+                    return self._failed(process, f"time limit of {limits.seconds:g} s passed", started, peak)
                 if limits.memory is not None and used > limits.memory:
-                    return self._failed(f"memory limit of {limits.memory / 1e6:.0f} MB passed", started, peak)
+                    return self._failed(process, f"memory limit of {limits.memory / 1e6:.0f} MB passed", started, peak)
             return message
-        except (EOFError, OSError):
-            return self._failed(None, started, peak)
+        except (EOFError, OSError, ValueError):  # ValueError: the stream was closed
+            return self._failed(process, None, started, peak)
 
     def close(self) -> None:
         """End the process."""
@@ -103,16 +103,16 @@ class IsolatedProcess:
                     with suppress(OSError):
                         stream.close()
 
-    def _failed(self, reason: str | None, started: float, peak: int) -> bytes:
-        process, errors = self._process, self._errors
-        assert process is not None
-        assert errors is not None
+    def _failed(self, process: subprocess.Popen[bytes], reason: str | None, started: float, peak: int) -> bytes:
         if reason is None:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(timeout=5)
             reason = _death(process.returncode)
-        errors.seek(0)
-        told = errors.read()[-4000:].decode(errors="replace")
+        told = ""
+        if self._errors is not None:
+            with suppress(OSError, ValueError):  # closed when the caller gave up meanwhile
+                self._errors.seek(0)
+                told = self._errors.read()[-4000:].decode(errors="replace")
         self.close()
         cost = Cost(seconds=time.monotonic() - started, peak_memory=peak)
         return Outcome(status="failed", reason=reason, traceback=told, cost=cost).to_bytes()

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
 
 from ..evaluators.base import Evaluation, Evaluator, Index
 from ..reports.tables import Cell, Entry, Incident, Leaderboard
 from ..scenes.errors import UnknownNameError
 from ..scenes.names import nearest_hint
+from .inference import (
+    LEVEL,
+    bootstrap_interval,
+    expanded_level,
+    holm,
+    letter_groups,
+    paired_p,
+    resampling_weights,
+    scenes_needed,
+)
 from .plan import Judge
 from .records import RunRow
 from .store import Store
 
-__all__ = ["default_rank_index", "incidents_of", "make_leaderboard", "repeat_command"]
+__all__ = ["default_rank_index", "incidents_of", "make_leaderboard", "rank_index", "repeat_command"]
+
+_RESAMPLES = 1000  # of pooled indices, each of which is summarised anew
 
 
 def make_leaderboard(
@@ -44,7 +60,7 @@ def make_leaderboard(
     rows = [row for row in rows if row.scene not in bare]
     scenes = tuple(dict.fromkeys(row.scene for row in rows))
     indices = tuple(index for index in judge.evaluator.indices if index.main)
-    ranking = _index(judge.evaluator, rank_by)
+    ranking = rank_index(judge.evaluator, rank_by)
     if ranking.key not in [index.key for index in indices]:
         indices = (*indices, ranking)
     boards = [
@@ -59,12 +75,14 @@ def make_leaderboard(
 
     boards.sort(key=order)
     entries: list[Entry] = []
+    complete = [board for board in boards if board.scenes == len(scenes)]
+    groups, group_note = _groups(complete, ranking)
     for place, board in enumerate(boards):
         measured = board.scenes == len(scenes) and board.pooled(ranking).value is not None
         same = place > 0 and order(boards[place - 1]) == order(board)
         rank = None if not measured else entries[-1].rank if same else place + 1
-        entries += board.entries(indices, rank=rank, group="")
-    notes = [*_notes(boards, scenes), *(f"{scene} has no reference and is left out" for scene in bare)]
+        entries += board.entries(indices, rank=rank, group=groups.get(board.label, ""))
+    notes = [*group_note, *_notes(boards, scenes), *(f"{scene} has no reference and is left out" for scene in bare)]
     return Leaderboard(
         title=title,
         evaluator=_described(judge.evaluator),
@@ -102,7 +120,35 @@ class _Tally:
         return len({row.scene for row in self._judged} - {row.scene for row in self.rows if row.status != "ok"})
 
     def pooled(self, index: Index) -> Cell:
-        return Cell(None if self._sum is None else self._sum.values[index.key], self.scenes)
+        """Return the ratio of the tallies of all runs, with its interval over resampled scenes."""
+        if self._sum is None:
+            return Cell(None, self.scenes)
+        low, high = self._pooled_intervals.get(index.key, (None, None))
+        return Cell(self._sum.values[index.key], self.scenes, low, high)
+
+    @cached_property
+    def _pooled_intervals(self) -> dict[str, tuple[float, float]]:
+        """Return the interval of every pooled index: scenes are resampled and their tallies added anew."""
+        names = sorted({name for evaluation in self._evaluations for name in evaluation.tallies})
+        scenes = {scene: place for place, scene in enumerate(dict.fromkeys(row.scene for row in self._judged))}
+        if len(scenes) < 2:
+            return {}
+        tallies = np.zeros((len(scenes), len(names)))
+        for row, evaluation in zip(self._judged, self._evaluations, strict=True):
+            tallies[scenes[row.scene]] += [evaluation.tallies.get(name, 0.0) for name in names]
+        resampled: dict[str, list[float]] = {}
+        for sums in resampling_weights(len(scenes), _RESAMPLES) @ tallies:
+            values = self._evaluator.summarise(dict(zip(names, sums.tolist(), strict=True)), {}).values
+            for key, value in values.items():
+                if value is not None:
+                    resampled.setdefault(key, []).append(value)
+        tail = expanded_level(len(scenes))
+        intervals = {}
+        for key, found in resampled.items():
+            if len(found) == _RESAMPLES:
+                low, high = np.quantile(found, [tail, 1 - tail])
+                intervals[key] = (float(low), float(high))
+        return intervals
 
     def scene_values(self, index: Index) -> dict[str, float]:
         """Return the mean over seeds of each scene where the index is defined."""
@@ -114,8 +160,10 @@ class _Tally:
         return {scene: statistics.fmean(found) for scene, found in values.items()}
 
     def mean(self, index: Index) -> Cell:
-        values = self.scene_values(index)
-        return Cell(statistics.fmean(values.values()) if values else None, len(values))
+        """Return the mean over scenes, with its interval."""
+        values = list(self.scene_values(index).values())
+        low, high = bootstrap_interval(values) or (None, None)
+        return Cell(statistics.fmean(values) if values else None, len(values), low, high)
 
     def entries(self, indices: Iterable[Index], *, rank: int | None, group: str) -> list[Entry]:
         """Return the pooled and the mean entry."""
@@ -145,13 +193,37 @@ class _Tally:
         return entries
 
 
+def _groups(boards: Sequence[_Tally], index: Index) -> tuple[dict[str, str], list[str]]:
+    """Return letters shared by detectors that cannot be told apart, and what was tested in words."""
+    if len(boards) < 2:
+        return {}, []
+    values = [board.scene_values(index) for board in boards]
+    pairs = list(itertools.combinations(range(len(boards)), 2))
+    common = {(i, j): sorted(values[i].keys() & values[j].keys()) for i, j in pairs}
+    fewest, needed = min(map(len, common.values())), scenes_needed(len(pairs))
+    if fewest < needed:
+        return {}, [
+            f"groups are not told apart: {len(pairs)} paired tests need {needed} scenes where {index.title} is "
+            f"defined, there are {fewest}"
+        ]
+    p_values = [paired_p([values[i][scene] - values[j][scene] for scene in common[i, j]]) for i, j in pairs]
+    differing = {pair for pair, p in zip(pairs, holm(p_values), strict=True) if p <= LEVEL}
+    letters = letter_groups(len(boards), lambda i, j: (i, j) in differing)
+    note = (
+        f"detectors that share a letter cannot be told apart by {index.title} on these scenes (paired tests over "
+        f"{fewest} scenes, Holm, level {LEVEL:g})"
+    )
+    return {board.label: letter for board, letter in zip(boards, letters, strict=True)}, [note]
+
+
 def default_rank_index(evaluator: Evaluator) -> Index:
     """Return the index that ranks when none is chosen: a quality, else the first that has a better direction."""
     directed = [index for index in evaluator.indices if index.better != "neither"]
     return next((index for index in directed if index.key == "object.quality"), (directed or evaluator.indices)[0])
 
 
-def _index(evaluator: Evaluator, key: str | None) -> Index:
+def rank_index(evaluator: Evaluator, key: str | None) -> Index:
+    """Return the index of that key, or the default one; an unknown key is answered with the nearest."""
     if key is None:
         return default_rank_index(evaluator)
     known = {index.key: index for index in evaluator.indices}

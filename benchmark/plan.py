@@ -13,7 +13,7 @@ from ..scenes.errors import UnsupportedError
 from ..scenes.scene import Scene
 from .keys import source_closure
 from .recipes import PluginRecipe, SceneRecipe, code_digest, label_of
-from .records import RunIdentity, evaluation_key
+from .records import RunIdentity, RunRow, evaluation_key
 from .store import Store
 from .suite import Entrant, Suite
 
@@ -206,6 +206,21 @@ def differences(store: Store, run_id: int, identity: RunIdentity) -> list[str]:
     if row.seed != identity.seed:
         found.append(f"seed is {identity.seed}, was {row.seed}")
     return found
+
+
+def identity_now(row: RunRow) -> RunIdentity:
+    """Return what the identity of a stored run would be today."""
+    recipe = PluginRecipe(row.detector, row.parameters)
+    detector = recipe.detector()
+    return RunIdentity(
+        detector=PluginRecipe(row.detector, detector.values()),
+        label=row.label,
+        fingerprint=detector.fingerprint(),
+        code=source_closure(type(detector)),
+        scene=row.recipe,
+        scene_key=row.recipe.key,
+        seed=row.seed,
+    )
 
 
 def plan_content(suite: Suite) -> dict[str, Any]:

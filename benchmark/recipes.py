@@ -6,7 +6,6 @@ and the store carry recipes and paths instead of megabytes.
 
 from __future__ import annotations
 
-import importlib
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,14 +17,19 @@ from ..detectors.base import Detector
 from ..detectors.registry import DETECTORS, make_detector
 from ..evaluators.base import Evaluator
 from ..evaluators.registry import EVALUATORS, make_evaluator
-from ..scenes.errors import InputError, UnsupportedError
+from ..scenes.builtin import hamlet
+from ..scenes.errors import ParameterError, UnsupportedError
+from ..scenes.folder import open_scene
 from ..scenes.names import Registry
 from ..scenes.scene import Scene
+from ..scenes.synthetic import make_scene
+from ..scenes.synthetic.presets import preset
+from ..scenes.synthetic.presets import preset_names as generator_presets
 from .keys import digest, module_closure, source_closure
 
 __all__ = ["PluginRecipe", "SceneRecipe", "label_of"]
 
-_ROOT = __package__.rpartition(".")[0]
+_HAMLET = "hamlet"
 _GENERATOR = "scenes.synthetic"
 _BUILTIN = "scenes.builtin"
 
@@ -118,12 +122,18 @@ class SceneRecipe:
         return cls("folder", _open_folder(str(path)).name, str(path))
 
     @classmethod
-    def of_preset(cls, preset: str, *, seed: int, parameters: Mapping[str, Any] | None = None) -> Self:
-        """Return the recipe of a synthetic scene."""
-        values = dict(parameters or {})
-        axes = ",".join(f"{name}={_short(value)}" for name, value in values.items())
-        name = f"{preset}-{seed}" + (f"[{axes}]" if axes else "")
-        return cls("builtin" if preset == "hamlet" else "preset", name, preset, seed, values)
+    def of_preset(cls, name: str, *, seed: int, parameters: Mapping[str, Any] | None = None) -> Self:
+        """Return the recipe of a synthetic scene.
+
+        Raises
+        ------
+        UnknownNameError, ParameterError
+            No such preset or parameter, or a value outside its range.
+        """
+        values = _checked_parameters(name, parameters or {})
+        axes = ",".join(f"{key}={_short(value)}" for key, value in values.items())
+        full_name = f"{name}-{seed}" + (f"[{axes}]" if axes else "")
+        return cls("builtin" if name == _HAMLET else "preset", full_name, name, seed, values)
 
     @classmethod
     def of_scene(cls, scene: Scene) -> Self:
@@ -150,9 +160,11 @@ class SceneRecipe:
         Its name (from which random streams follow) with the content of its files, or with the generator's code, seed
         and parameters.
         """
-        if self.kind in ("preset", "builtin"):
-            module = _GENERATOR if self.kind == "preset" else _BUILTIN
-            return digest([self.name, module_closure(module).digest, self.place, self.seed, dict(self.parameters)])
+        if self.kind == "builtin":
+            return digest([self.name, module_closure(_BUILTIN).digest, self.seed])
+        if self.kind == "preset":
+            values = preset(self.place, **self.parameters).values()
+            return digest([self.name, module_closure(_GENERATOR).digest, values, self.seed])
         return digest([self.name, self.content_hash or _open_folder(self.place).content_hash])
 
     def open(self) -> Scene:
@@ -160,10 +172,6 @@ class SceneRecipe:
         if self.kind == "folder":
             return _open_folder(self.place)
         if self.kind == "builtin":
-            from ..scenes.builtin import hamlet
-
-            if self.parameters:
-                raise InputError(f"the built-in scene has no parameter {next(iter(self.parameters))!r}: only a seed")
             return hamlet(self.seed)
         if self.kind == "spooled":
             from .spool import read_spooled
@@ -171,7 +179,7 @@ class SceneRecipe:
             return read_spooled(Path(self.place), name=self.name)
         if self.kind == "memory":
             raise UnsupportedError(f"scene {self.name!r} lives in the memory of another process: spool it first")
-        return make_preset(self.place, self.seed, self.parameters)
+        return make_scene(self.place, seed=self.seed, **self.parameters)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what JSON holds."""
@@ -192,20 +200,22 @@ class SceneRecipe:
 
 @lru_cache(maxsize=8)
 def _open_folder(folder: str) -> Scene:
-    scene: Scene = importlib.import_module(f"{_ROOT}.scenes.folder").open_scene(folder)
-    return scene
+    return open_scene(folder)
 
 
-def make_preset(preset: str, seed: int, parameters: Mapping[str, Any]) -> Scene:
-    """Return a synthetic scene of a preset."""
-    scene: Scene = importlib.import_module(f"{_ROOT}.{_GENERATOR}").make_scene(preset, seed=seed, **parameters)
-    return scene
+def _checked_parameters(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return generator parameters as the generator takes them, or raise `ParameterError`."""
+    if name != _HAMLET:
+        recipe = preset(name, **parameters)
+        return {key: getattr(recipe, key) for key in parameters}
+    if parameters:
+        raise ParameterError(f"the built-in scene {name!r} has no parameter {next(iter(parameters))!r}: only a seed")
+    return {}
 
 
 def preset_names() -> list[str]:
-    """Return the names of the scenes that can be generated."""
-    generated: list[str] = importlib.import_module(f"{_ROOT}.{_GENERATOR}").preset_names()
-    return ["hamlet", *generated]
+    """Return the names of the scenes that can be generated, the built-in one included."""
+    return [_HAMLET, *generator_presets()]
 
 
 def code_digest(plugin: Detector | Evaluator) -> str:

@@ -120,3 +120,4 @@ class StoredScene:
     area: shapely.Geometry | None
     reference: Footprints | None
     facts: Mapping[str, Any]
+    point_count: int | None

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..scenes.errors import UnsupportedError
 from ..scenes.scene import Scene
-from .executors import InProcess, cluster_executor, local_executor
+from .dispatch import Dispatcher
+from .executors import InProcess, Slot, cluster_slot, local_slots
 from .isolation import Limits, call_isolated
 from .plan import Judge, Overwrite, Plan, PlannedRun, scene_recipe
 from .provenance import code_version
@@ -23,9 +24,6 @@ from .tasks import Outcome, Score, Task
 from .worker import execute
 
 __all__ = ["Execution", "RunResult", "run_plan", "score_stored"]
-
-#: Tasks handed to an executor beyond its workers, so that no worker waits for the store.
-_AHEAD = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,12 +144,13 @@ def _outcomes(
     described = store.described_scenes()
     evaluators = tuple(judge.recipe for judge in plan.judges)
     with ExitStack() as stack:
-        executor, workers = stack.enter_context(_executor(execution, len(runs)))
-        elsewhere = not isinstance(executor, InProcess)
+        slots = stack.enter_context(_slots(execution, len(runs)))
+        elsewhere = execution.jobs > 0 or execution.scheduler is not None
         scenes = _Scenes(stack, elsewhere=elsewhere)
-        waiting, flying = iter(runs), dict[Future[bytes], PlannedRun]()
+        dispatcher, flying = Dispatcher(runs), dict[Future[bytes], tuple[PlannedRun, Slot]]()
+        free = [slot for slot in slots for _ in range(slot.capacity)]
         while True:
-            while len(flying) < workers + _AHEAD and (run := next(waiting, None)) is not None:
+            while free and (run := dispatcher.next_for(free[0])) is not None:
                 if overwrite != "always" and _is_stored(store, run):
                     continue
                 task = Task(
@@ -161,32 +160,29 @@ def _outcomes(
                     evaluators=evaluators,
                     describe_scene=run.identity.scene_key not in described,
                 )
+                slot = free.pop(0)
                 if elsewhere:
                     _must_be_portable(run)
-                    flying[executor.submit(call_isolated, task.to_json(), execution.limits)] = run
+                    future = slot.executor.submit(call_isolated, task.to_json(), execution.limits)
                 else:
-                    outcome = _in_process(run, task, plan)
-                    _note_description(described, run, outcome)
-                    yield run, outcome
+                    future = slot.executor.submit(_in_process, run, task, plan)
+                flying[future] = run, slot
             if not flying:
                 return
             finished, _ = wait(flying, return_when=FIRST_COMPLETED)
             for future in finished:
-                run = flying.pop(future)
+                run, slot = flying.pop(future)
+                free.append(slot)
                 outcome = _outcome(future)
-                _note_description(described, run, outcome)
+                if outcome.scene is not None:
+                    described.add(run.identity.scene_key)
                 yield run, outcome
 
 
-def _note_description(described: set[str], run: PlannedRun, outcome: Outcome) -> None:
-    if outcome.scene is not None:
-        described.add(run.identity.scene_key)
-
-
-def _in_process(run: PlannedRun, task: Task, plan: Plan) -> Outcome:
+def _in_process(run: PlannedRun, task: Task, plan: Plan) -> bytes:
     scene = run.scene if isinstance(run.scene, Scene) else None
     evaluators = [judge.evaluator for judge in plan.judges]
-    return execute(task, scene=scene, detector=run.entrant.detector, evaluators=evaluators)
+    return execute(task, scene=scene, detector=run.entrant.detector, evaluators=evaluators).to_bytes()
 
 
 def _outcome(future: Future[bytes]) -> Outcome:
@@ -227,15 +223,14 @@ class _Scenes:
 
 
 @contextmanager
-def _executor(execution: Execution, tasks: int) -> Iterator[tuple[Executor, int]]:
+def _slots(execution: Execution, tasks: int) -> Iterator[list[Slot]]:
     if execution.scheduler is not None:
         if execution.jobs == 0:
             raise UnsupportedError("jobs=0 runs in this process and cannot be combined with a scheduler")
-        with cluster_executor(execution.scheduler) as pair:
-            yield pair
+        with cluster_slot(execution.scheduler) as slot:
+            yield [slot]
     elif execution.jobs == 0:
-        yield InProcess(), 1
+        yield [Slot(InProcess(), 1)]
     else:
-        workers = min(execution.jobs, tasks)
-        with local_executor(workers) as executor:
-            yield executor, workers
+        with local_slots(min(execution.jobs, tasks)) as slots:
+            yield slots

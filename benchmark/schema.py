@@ -13,7 +13,7 @@ from ..scenes.errors import InputError
 
 __all__ = ["VERSION", "prepare"]
 
-VERSION = 1
+VERSION = 2
 
 #: One script per version: MIGRATIONS[n] leads from version n to n + 1.
 MIGRATIONS: tuple[str, ...] = (
@@ -116,6 +116,13 @@ MIGRATIONS: tuple[str, ...] = (
         command TEXT NOT NULL,            -- the command that made it
         created TEXT NOT NULL,
         content TEXT NOT NULL UNIQUE      -- JSON: the recipes of every task, to resume without the suite file
+    );
+    """,
+    """
+    ALTER TABLE scenes ADD COLUMN point_count INTEGER;
+    CREATE TABLE scene_pictures (
+        scene_id INTEGER PRIMARY KEY REFERENCES scenes ON DELETE CASCADE,
+        content BLOB NOT NULL             -- WebP over the extent, for reports
     );
     """,
 )

@@ -187,7 +187,7 @@ class Store(StoreReader):
         labels = None if record.building_ids is None else canonical(list(record.building_ids))
         db.execute(
             """UPDATE scenes SET content_hash = ?, crs = ?, extent = ?, grid = ?, area = ?,
-               reference_count = ?, building_ids = ?, facts = ?
+               reference_count = ?, building_ids = ?, facts = ?, point_count = ?
                WHERE id = ?""",
             (
                 record.content_hash,
@@ -198,9 +198,12 @@ class Store(StoreReader):
                 None if record.reference is None else len(record.reference),
                 labels,
                 canonical(dict(record.facts)),
+                record.point_count,
                 scene_id,
             ),
         )
+        if record.picture is not None:
+            db.execute("INSERT OR REPLACE INTO scene_pictures VALUES (?, ?)", (scene_id, record.picture))
         if record.reference is not None:
             db.executemany(
                 "INSERT INTO scene_references VALUES (?, ?, ?, ?)",

@@ -156,7 +156,13 @@ class StoreReader:
             area=None if row["area"] is None else shapely.from_wkb(row["area"]),
             reference=reference,
             facts=json.loads(row["facts"] or "{}"),
+            point_count=row["point_count"],
         )
+
+    def scene_picture(self, scene_id: int) -> bytes | None:
+        """Return the picture of a scene (WebP over its extent); None when it has none or was never opened."""
+        row = self._db.execute("SELECT content FROM scene_pictures WHERE scene_id = ?", (scene_id,)).fetchone()
+        return None if row is None else bytes(row["content"])
 
     def reference_counts(self) -> dict[int, int | None]:
         """Return the number of reference footprints of every scene that was opened; None where it has no reference."""
@@ -219,6 +225,16 @@ class StoreReader:
         """Return the key and recipe of every evaluator that has judged a run."""
         rows = self._db.execute("SELECT key, evaluator, parameters FROM evaluations GROUP BY key ORDER BY MIN(id)")
         return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
+
+    def evaluators_of(self, run_id: int) -> list[tuple[str, PluginRecipe]]:
+        """Return the key and recipe of every evaluator that has judged this run."""
+        query = "SELECT key, evaluator, parameters FROM evaluations WHERE run_id = ? ORDER BY id"
+        rows = self._db.execute(query, (run_id,))
+        return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
+
+    def count_runs(self) -> int:
+        """Return how many runs are stored."""
+        return int(self._db.execute("SELECT COUNT(*) FROM runs").fetchone()[0])
 
     def code(self, run_id: int) -> SourceClosure:
         """Return the source closure that a run was made with."""

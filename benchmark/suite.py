@@ -266,8 +266,12 @@ def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number
         if not axis or not all(isinstance(value, bool | int | float | str) for value in axis):
             raise places.error(f"{key!r} must be a value or a list of values", "scenes", number, key)
     for values in itertools.product(*axes):
+        parameters = dict(zip(names, values, strict=True))
         for seed in seeds:
-            yield SceneRecipe.of_preset(preset, seed=seed, parameters=dict(zip(names, values, strict=True)))
+            try:
+                yield SceneRecipe.of_preset(preset, seed=seed, parameters=parameters)
+            except RoofbenchError as error:
+                raise places.error(str(error), "scenes", number, _named_key(error, parameters)) from error
 
 
 def _entrant(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> Entrant:

@@ -148,7 +148,10 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneRecord:
-    """What the store keeps of a scene: enough to evaluate and to draw verdicts without opening it again."""
+    """What the store keeps of a scene: enough to evaluate and to draw verdicts without opening it again.
+
+    `picture` is a WebP file over the extent (see `reports.scene_picture`), `point_count` the size of the point cloud.
+    """
 
     content_hash: str
     crs: str | None
@@ -159,6 +162,8 @@ class SceneRecord:
     reference_ids: tuple[int, ...] = ()
     building_ids: tuple[int | str, ...] | None = None
     facts: Mapping[str, Any] = field(default_factory=dict)
+    point_count: int | None = None
+    picture: bytes | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,9 +208,9 @@ class Outcome:
         header["detections"] = len(self.detections)
         if self.scene is not None:
             reference = self.scene.reference
-            blobs += [*(reference or ()), *([self.scene.area] if self.scene.area is not None else [])]
+            blobs += [*(reference or ()), self.scene.area or b"", self.scene.picture or b""]
             header["scene"]["reference"] = None if reference is None else len(reference)
-            header["scene"]["area"] = self.scene.area is not None
+            header["scene"]["area"] = header["scene"]["picture"] = None
         text = json.dumps(header).encode()
         lengths = np.array([len(blob) for blob in blobs], dtype="<u8").tobytes()
         return b"".join([struct.pack("<QQ", len(text), len(blobs)), text, lengths, *blobs])
@@ -230,7 +235,7 @@ class Outcome:
             record = header["scene"]
             if record["reference"] is not None:
                 record["reference"] = tuple(blobs[number : number + record["reference"]])
-            record["area"] = blobs[-1] if record["area"] else None
+            record["area"], record["picture"] = (blob or None for blob in blobs[-2:])
             for name in ("extent", "grid", "reference_ids", "building_ids"):
                 record[name] = None if record[name] is None else tuple(record[name])
             header["scene"] = SceneRecord(**record)

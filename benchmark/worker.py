@@ -19,6 +19,7 @@ import shapely
 from ..detectors.base import Detector
 from ..detectors.checks import checked_output
 from ..evaluators.base import Evaluator
+from ..reports.scene_picture import scene_picture
 from ..scenes.errors import RoofbenchError
 from ..scenes.footprints import Footprints
 from ..scenes.scene import Scene
@@ -26,7 +27,7 @@ from .keys import random_stream_entropy
 from .recipes import PluginRecipe, SceneRecipe, code_digest
 from .tasks import Cost, Outcome, SceneRecord, Score, Task, _plain
 
-__all__ = ["detect", "execute", "execute_text", "machine_facts"]
+__all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream"]
 
 #: Scenes that were opened last; neighbouring tasks of a plan are about one scene.
 _scenes: OrderedDict[str, Scene] = OrderedDict()
@@ -37,8 +38,12 @@ def detect(scene: Scene, detector: Detector, *, seed: int = 0) -> Footprints:
     """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector."""
     visible = scene.for_detection()
     visible.require(detector.requires)
-    rng = np.random.default_rng(np.random.SeedSequence(random_stream_entropy(seed, scene.name, detector.name)))
-    return checked_output(detector.detect(visible, rng), scene, detector.name)
+    return checked_output(detector.detect(visible, random_stream(seed, scene, detector)), scene, detector.name)
+
+
+def random_stream(seed: int, scene: Scene, detector: Detector) -> np.random.Generator:
+    """Return the generator from which a detector draws on a scene."""
+    return np.random.default_rng(np.random.SeedSequence(random_stream_entropy(seed, scene.name, detector.name)))
 
 
 def execute_text(task: str) -> bytes:
@@ -122,7 +127,7 @@ def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecip
 
 def describe(scene: Scene) -> SceneRecord:
     """Return what the store keeps of a scene."""
-    reference, grid = scene.reference, scene.evaluation_grid
+    reference, grid, picture = scene.reference, scene.evaluation_grid, scene_picture(scene)
     labels = None if reference is None or reference.building_ids is None else reference.building_ids
     return SceneRecord(
         content_hash=scene.content_hash,
@@ -134,6 +139,8 @@ def describe(scene: Scene) -> SceneRecord:
         reference_ids=() if reference is None else tuple(reference.ids.tolist()),
         building_ids=None if labels is None else tuple(_plain(label) for label in labels),
         facts={name: value for name, value in scene.facts.items() if _is_json(value)},
+        point_count=None if scene.points is None else len(scene.points),
+        picture=None if picture is None else picture.content,
     )
 
 

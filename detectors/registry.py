@@ -18,6 +18,7 @@ DETECTORS = Registry(
         "improved": "detectors.lines.improved:Improved",
         "ndsm": "detectors.ndsm:NDSM",
         "original": "detectors.lines.original:Original",
+        "mpp": "detectors.mpp.detector:MPP",
     },
 )
 

@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["Cell", "Entry", "Incident", "Leaderboard", "column_title", "format_value"]
+__all__ = ["Cell", "Entry", "Incident", "Leaderboard", "column_title", "format_cell"]
 
 _DECIMALS = {"fraction": 1, "ratio": 3, "m": 2, "px": 1, "count": 0}
 _UNITS = {"fraction": "%", "ratio": "", "m": "m", "px": "px", "count": ""}
 
 
-def format_value(value: float | None, unit: str) -> str:
+def format_cell(value: float | None, unit: str) -> str:
     """Return a value as printed: fractions in percent, empty where undefined.
 
-    >>> format_value(0.9283, "fraction"), format_value(1.234, "m"), format_value(None, "m")
+    >>> format_cell(0.9283, "fraction"), format_cell(1.234, "m"), format_cell(None, "m")
     ('92.8', '1.23', '')
     """
     if value is None:
@@ -148,8 +148,9 @@ class Leaderboard:
     def caption(self) -> str:
         """Return in words what the figures are of."""
         shown = ", ".join(self.scenes[:4]) + (f" and {len(self.scenes) - 4} more" if len(self.scenes) > 4 else "")
+        count = f"{len(self.scenes)} scene{'s' if len(self.scenes) != 1 else ''}"
         return (
-            f"{len(self.scenes)} scenes ({shown}); {self.evaluator}; ranked by {self.rank_by.title} "
+            f"{count} ({shown}); {self.evaluator}; ranked by {self.rank_by.title} "
             f"({self.rank_by.symbol}, pooled); pooled: counts added over scenes, then the ratio; mean: mean over "
             "scenes, (n) where it is defined in n of them only; empty: undefined"
         )
@@ -234,11 +235,12 @@ class Leaderboard:
     def _tables(self, width: int) -> list[Table]:
         from rich import box
         from rich.table import Table
+        from rich.text import Text
 
         header, rows = self._printed()
         fixed = [i for i, name in enumerate(header) if name in _FIXED]
         free = [i for i, name in enumerate(header) if name not in _FIXED]
-        widths = [max(len(name), *(len(row[i]) for row in rows)) + _GAP for i, name in enumerate(header)]
+        widths = [max([len(name), *(len(row[i]) for row in rows)]) + _GAP for i, name in enumerate(header)]
         chunks: list[list[int]] = [[]]
         for i in free:
             if chunks[-1] and sum(widths[j] for j in (*fixed, *chunks[-1], i)) > width:
@@ -249,9 +251,9 @@ class Leaderboard:
             table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), show_edge=False)
             for i in (*fixed, *chunk):
                 justify: Literal["left", "right"] = "left" if header[i] in _LEFT else "right"
-                table.add_column(header[i], justify=justify, no_wrap=True, overflow="ellipsis")
+                table.add_column(Text(header[i]), justify=justify, no_wrap=True, overflow="ellipsis")
             for row in rows:
-                table.add_row(*(row[i] for i in (*fixed, *chunk)))
+                table.add_row(*(Text(row[i]) for i in (*fixed, *chunk)))
             tables.append(table)
         return tables
 
@@ -259,6 +261,7 @@ class Leaderboard:
         grouped = any(entry.group for entry in self.entries)
         header = ["rank", *(["group"] if grouped else []), "detector", "over", "scenes"]
         header += [column_title(index) for index in self.indices]
+        header.append(f"{self.rank_by.symbol or self.rank_by.title} 95 %")
         header += ["objects", "CPU s", "MB"]
         rows = []
         for entry in self.entries:
@@ -267,9 +270,12 @@ class Leaderboard:
             row += [entry.label, entry.pooling, scenes]
             for index in self.indices:
                 cell = entry.cells[index.key]
-                text = format_value(cell.value, index.unit)
+                text = format_cell(cell.value, index.unit)
                 partial = entry.pooling == "mean" and cell.scenes < entry.scenes
                 row.append(f"{text} ({cell.scenes})".strip() if partial else text)
+            ranked = entry.cells[self.rank_by.key]
+            bounds = [format_cell(bound, self.rank_by.unit) for bound in (ranked.low, ranked.high)]
+            row.append("–".join(bounds) if ranked.low is not None else "")
             row.append(f"{entry.detected}/{entry.reference}")
             row.append("" if entry.cpu_seconds is None else f"{entry.cpu_seconds:.2f}")
             row.append("" if not entry.peak_memory else f"{entry.peak_memory / 1e6:.0f}")

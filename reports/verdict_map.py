@@ -53,7 +53,7 @@ def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry
     verdicts = evaluation.verdicts
     if verdicts is None:
         raise ValueError("a pooled evaluation has no verdicts to draw")
-    figure = Figure(figsize=(13, 8), dpi=110, layout="constrained")
+    figure = Figure(figsize=(13, 8), dpi=100, layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=[2.4, 1], squeeze=False)[0]
     figure.suptitle(_shortened(title, 150), x=0.01, ha="left", fontsize=11, parse_math=False)
     places, total = _places(verdicts)

@@ -42,7 +42,7 @@ def outlines_of_class(
     code : int
         ASPRS class; 6 is building.
     cell : float, optional
-        Cell size in metres; by default the one at which a cell on a roof holds three points, from 0.25 m to 2 m.
+        Cell size in metres; by default the one at which a cell on a roof holds two points, from 0.25 m to 2 m.
     minimum_area : float
         Regions and holes smaller than this, m2, are dropped; holes below a quarter of it are filled.
     crs : str, optional
@@ -70,7 +70,7 @@ def outlines_of_class(
     index, inside = grid.cells(x, y)
     mask = np.bincount(index[inside], minlength=grid.rows * grid.columns).reshape(grid.shape) > 0
     disc = ndimage.generate_binary_structure(2, 1)
-    mask = ndimage.binary_closing(mask, disc, iterations=2)
+    mask = ndimage.binary_closing(mask, disc)
     mask = ndimage.binary_opening(mask, np.ones((3, 3), dtype=bool))
     traced = features.shapes(mask.astype(np.uint8), mask=mask, connectivity=4, transform=Affine(*grid.transform))
     polygons = [shapely.geometry.shape(geometry) for geometry, _ in traced]
@@ -83,12 +83,12 @@ def outlines_of_class(
 
 
 def _cell(x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, float, float, float]) -> float:
-    """Return the cell size at which an average cell of 2 m with points would give three points to each part."""
+    """Return the cell size that holds two points where the median of the 2 m cells with points is."""
     coarse = Grid.covering(extent, 2.0)
     index, inside = coarse.cells(x, y)
     counts = np.bincount(index[inside])
     density = float(np.median(counts[counts > 0])) / 4.0 if inside.any() else 1.0
-    return float(np.clip(np.ceil(20 * np.sqrt(3.0 / density)) / 20, 0.25, 2.0))
+    return float(np.clip(np.ceil(20 * np.sqrt(2.0 / density)) / 20, 0.25, 2.0))
 
 
 def _padded(grid: Grid) -> Grid:

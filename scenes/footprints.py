@@ -26,6 +26,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
+from .vector_columns import labels_of
 
 __all__ = ["Footprints", "Repair"]
 
@@ -107,8 +108,11 @@ class Footprints:
     ) -> Footprints:
         """Build from any geometries: mends invalid ones, leaves out unusable ones, and reports both.
 
-        Invalid geometry is replaced by the polygonal part of its `make_valid`. None, empty, zero-area, non-finite and
-        non-polygonal geometries are left out. Z and M are dropped; a multipolygon of one part becomes a polygon.
+        Building ids may be numbers or texts; a polygon without one (None, NaN) is its own building.
+
+        Invalid geometry is replaced by the polygonal part of its `make_valid`, overlapping parts joined. None, empty,
+        zero-area, non-finite and non-polygonal geometries are left out. Z and M are dropped; a multipolygon of one
+        part becomes a polygon.
 
         Examples
         --------
@@ -121,7 +125,7 @@ class Footprints:
         clean, repairs, kept = _mend(geometries)
         columns = {}
         for name, column in (attributes or {}).items():
-            values = np.asarray(column)
+            values = column if isinstance(column, np.ndarray) else np.asarray(column)  # keeps the mask of a masked one
             if len(values) != len(geometries):
                 raise InputError(
                     f"{source}: attribute {name!r} has {len(values)} values for {len(geometries)} polygons"
@@ -129,10 +133,10 @@ class Footprints:
             columns[name] = values[kept]
         labels = None
         if building_ids is not None:
-            labels = np.asarray(building_ids)
-            if labels.shape != geometries.shape:
-                raise InputError(f"{source}: {labels.size} building ids for {len(geometries)} polygons: give one each")
-            labels = labels[kept]
+            given = building_ids if isinstance(building_ids, np.ndarray) else _as_column(building_ids)
+            if given.shape != geometries.shape:
+                raise InputError(f"{source}: {given.size} building ids for {len(geometries)} polygons: give one each")
+            labels = labels_of(given)[kept]
         return cls(
             polygons=clean,
             building_ids=labels,
@@ -176,6 +180,24 @@ class Footprints:
             repairs=self.repairs,
             source=self.source,
         )
+
+    def joined(self, gap: float) -> Footprints:
+        """Return blocks: footprints that are closer than `gap` (m) are joined into one, building ids are dropped.
+
+        A register cuts rows into houses; joined over party walls, its blocks can be compared with detections that
+        cannot see those. Outlines stay where they are but for gaps and notches narrower than `gap`.
+
+        Examples
+        --------
+        >>> row = Footprints.of([shapely.box(0, 0, 5, 9), shapely.box(5.02, 0, 10, 9), shapely.box(20, 0, 25, 9)])
+        >>> [round(area, 1) for area in row.joined(0.1).areas]
+        [90.0, 45.0]
+        """
+        if not gap > 0:
+            raise InputError(f"{self.source}: footprints are joined over a gap of more than 0 m, not {gap:g}")
+        grown = shapely.union_all(shapely.buffer(self.polygons, gap / 2, join_style="mitre"))
+        blocks = shapely.get_parts(shapely.buffer(grown, -gap / 2, join_style="mitre"))
+        return Footprints.of(blocks, crs=self.crs, source=f"{self.source} (joined over gaps below {gap:g} m)")
 
     @cached_property
     def areas(self) -> NDArray[np.float64]:
@@ -224,6 +246,8 @@ class Footprints:
 
 
 def _as_geometry_array(polygons: Iterable[Any]) -> NDArray[np.object_]:
+    if isinstance(polygons, shapely.Geometry) or (isinstance(polygons, np.ndarray) and polygons.ndim != 1):
+        raise InputError("footprints are built from a sequence of polygons, one dimension: put a single one in a list")
     items = polygons if isinstance(polygons, np.ndarray) else list(polygons)
     array = np.empty(len(items), dtype=object)
     array[:] = items
@@ -231,6 +255,13 @@ def _as_geometry_array(polygons: Iterable[Any]) -> NDArray[np.object_]:
         wrong = next(item for item in array if item is not None and not shapely.is_geometry(item))
         raise InputError(f"footprints are shapely polygons, not {type(wrong).__name__}")
     return array
+
+
+def _as_column(values: Any) -> NDArray[Any]:
+    """Return a list as an array that keeps texts and numbers apart."""
+    items = list(values)
+    plain = all(isinstance(item, str) for item in items) or all(isinstance(item, int | np.integer) for item in items)
+    return np.array(items) if plain and items else np.array(items, dtype=object)
 
 
 def _mend(
@@ -253,20 +284,26 @@ def _mend(
         repairs.append(Repair(int(row), f"not a polygon: {geometries[row].geom_type}", "left out"))
     kept &= polygonal
     finite = np.isfinite(shapely.bounds(geometries)).all(axis=1)
-    finite[kept] &= np.isfinite(shapely.area(geometries[kept]))
+    with np.errstate(over="ignore", invalid="ignore"):
+        finite[kept] &= np.isfinite(shapely.area(geometries[kept]))
     leave_out(~finite, "coordinates that are not finite")
 
     suspect = np.flatnonzero(kept)[~shapely.is_valid(geometries[kept])]
     suspect = np.union1d(suspect, np.flatnonzero(kept & (shapely.get_type_id(geometries) == 7)))
     for row in suspect:
-        problem = shapely.is_valid_reason(geometries[row])
-        geometries[row] = _polygonal_part(shapely.make_valid(geometries[row]))
+        collection = geometries[row].geom_type == "GeometryCollection"
+        problem = "a collection of geometries" if collection else shapely.is_valid_reason(geometries[row])
+        # "structure" joins overlapping parts; "linework" would make holes where they overlap.
+        mended = shapely.make_valid(geometries[row], method="structure", keep_collapsed=False)
+        geometries[row] = _polygonal_part(mended)
         usable = not geometries[row].is_empty
         repairs.append(Repair(int(row), problem, "mended" if usable else "left out"))
         kept[row] = usable
     single = kept & (shapely.get_type_id(geometries) == 6) & (shapely.get_num_geometries(geometries) == 1)
     geometries[single] = shapely.get_geometry(geometries[single], 0)
-    leave_out(kept & ~(shapely.area(geometries) > 0), "zero area")
+    flat = np.zeros(len(geometries), dtype=bool)
+    flat[kept] = ~(shapely.area(geometries[kept]) > 0)
+    leave_out(flat, "zero area")
     repairs.sort(key=lambda repair: repair.id)
     return geometries[kept], tuple(repairs), kept
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from .errors import InputError, ParameterError, UnknownNameError
 
-__all__ = ["Registry", "nearest_hint", "parse_selection"]
+__all__ = ["Registry", "nearest_hint", "parse_selection", "split_list"]
 
 _SELECTION = re.compile(r"^(?P<name>[^\[\]]+?)(?:\[(?P<parameters>.*)\])?$", re.DOTALL)
 
@@ -47,6 +47,15 @@ def parse_selection(text: str) -> tuple[str, dict[str, str]]:
                 raise ParameterError(f"cannot read {item.strip()!r} in {text!r}: write parameter=value")
             values[key.strip()] = value.strip()
     return match["name"].strip(), values
+
+
+def split_list(text: str) -> list[str]:
+    """Split at commas outside brackets.
+
+    >>> split_list("ndsm[cell=0.5,height=2],original")
+    ['ndsm[cell=0.5,height=2]', 'original']
+    """
+    return [part.strip() for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
 
 
 class Registry:

@@ -5,9 +5,12 @@ A layer of a file with several is named as QGIS does, ``city.gpkg|layername=roof
 
 from __future__ import annotations
 
+import dataclasses
 import os
+import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +20,15 @@ from numpy.typing import NDArray
 
 from .crs import common_crs, crs_label, parse_crs, require_metric, same_crs
 from .errors import CRSError, InputError, OutputError
-from .footprints import Footprints
+from .footprints import Footprints, Repair
 from .names import nearest_hint
 from .output import whole_file
+from .vector_columns import storable_columns
 
 __all__ = ["DRIVERS", "read_footprints", "read_polygon", "split_layer", "write_footprints", "write_layers"]
 
+#: Geometry type of shapely to that of OGR.
+_KINDS = {1: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon", 0: "Point", 4: "MultiPoint"}
 #: File ending to GDAL driver; GeoParquet is read and written by geopandas (extra ``parquet``).
 DRIVERS: Mapping[str, str] = {
     ".geojson": "GeoJSON",
@@ -87,11 +93,12 @@ def read_footprints(
         raise InputError(f"{file}: no such file")
     if crs is not None:
         parse_crs(crs)
+    closed: list[Repair] = []
     if DRIVERS.get(file.suffix.lower()) == "Parquet":
         geometries, columns, own_crs = _read_parquet(file)
     else:
-        geometries, columns, own_crs = _read_ogr(file, layer)
-    if crs is None and not _in_degrees_at_most(file, own_crs, geometries):
+        geometries, columns, own_crs, closed = _read_ogr(file, layer)
+    if crs is None and own_crs == "EPSG:4326" and not _means_degrees(file, geometries):
         own_crs = None
     crs = crs or own_crs
     if to_crs is not None:
@@ -100,6 +107,11 @@ def read_footprints(
         require_metric(crs, str(file))
     identifiers = _building_ids(file, columns, building_id)
     footprints = Footprints.of(geometries, building_ids=identifiers, crs=crs, attributes=columns, source=str(file))
+    told = {repair.id for repair in footprints.repairs}
+    more = [repair for repair in closed if repair.id not in told]
+    if more:
+        repairs = sorted([*footprints.repairs, *more], key=lambda repair: repair.id)
+        footprints = dataclasses.replace(footprints, repairs=tuple(repairs))
     if len(geometries) and not len(footprints):
         kinds = sorted({repair.problem for repair in footprints.repairs})
         raise InputError(f"{file}: no polygons among {len(geometries)} features ({'; '.join(kinds[:3])})")
@@ -169,33 +181,71 @@ def write_layers(
         )
     if len(layers) > 1 and driver != "GPKG":
         raise OutputError(f"{file}: {len(layers)} layers ({', '.join(layers)}) need a GeoPackage: name it .gpkg")
+    if crs is not None:
+        known = parse_crs(crs)
+        if driver == "GeoJSON" and known.to_authority(min_confidence=100) is None:
+            raise OutputError(
+                f"{file}: GeoJSON names a CRS by its EPSG code, and {known.name!r} has none: write a GeoPackage (.gpkg)"
+            )
     with whole_file(file, overwrite=overwrite) as scratch:
-        for number, (layer, (geometries, columns)) in enumerate(layers.items()):
+        for number, (layer, (geometries, table)) in enumerate(layers.items()):
+            columns = storable_columns(table, driver, file)
+            if driver == "GPKG" and layer.lower().startswith(("gpkg", "sqlite")):
+                layer = f"layer_{layer}"
             if driver == "Parquet":
                 _write_parquet(scratch, geometries, columns, crs)
             else:
                 _write_ogr(scratch, driver, layer, geometries, columns, crs, append=number > 0)
 
 
-def _read_ogr(file: Path, layer: str | None) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None]:
+def _read_ogr(
+    file: Path, layer: str | None
+) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None, list[Repair]]:
     import pyogrio.raw
     from pyogrio.errors import DataLayerError, DataSourceError
 
+    if file.is_dir() and file.suffix.lower() != ".gdb":
+        raise InputError(f"{file} is a folder: name a vector file, for instance .gpkg or .geojson")
     try:
-        names = [str(name) for name in pyogrio.list_layers(file)[:, 0]]
+        listed = pyogrio.list_layers(file)
+        names = [str(name) for name, kind in listed if kind is not None] or [str(name) for name in listed[:, 0]]
         if layer is None and len(names) > 1:
             raise InputError(
                 f"{file} has {len(names)} layers ({', '.join(names)}): name one as '{file}|layername={names[0]}'"
             )
         if layer is not None and layer not in names:
             raise InputError(f"{file} has no layer {layer!r}{nearest_hint(layer, names)}; it has {', '.join(names)}")
-        meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer)
+        with _quiet():
+            meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0])
     except (DataSourceError, DataLayerError) as error:
-        raise InputError(f"{file} cannot be read as a vector file: {error}") from error
+        reason = " ".join(str(error).partition("; It might help")[0].split())
+        raise InputError(f"{file} cannot be read as a vector file: {reason}") from error
     if wkb is None:
         raise InputError(f"{file}: no polygons: the layer {layer or names[0]!r} has no geometry")
-    geometries = np.asarray(shapely.from_wkb(wkb), dtype=object)
-    return geometries, dict(zip(map(str, meta["fields"]), fields, strict=True)), meta["crs"]
+    columns = dict(zip(map(str, meta["fields"]), fields, strict=True))
+    if file.suffix.lower() == ".shp" and "building_i" in columns:
+        columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name
+    geometries, closed = _geometries(wkb)
+    return geometries, columns, meta["crs"], closed
+
+
+def _geometries(wkb: NDArray[np.object_]) -> tuple[NDArray[np.object_], list[Repair]]:
+    """Return geometries of WKB; rings that end elsewhere than they began are closed and reported."""
+    geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
+    unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
+    closed = []
+    for row in unread:
+        geometries[row] = shapely.from_wkb(wkb[row], on_invalid="fix")
+        closed.append(Repair(int(row), "a ring that is not closed", "mended"))
+    return geometries, closed
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep GDAL's warnings about what is meant (no CRS, short names, NaN in JSON) from the user."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None]:
@@ -203,8 +253,14 @@ def _read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[An
     try:
         frame = geopandas.read_parquet(file)
     except (ValueError, OSError) as error:
-        raise InputError(f"{file} cannot be read as GeoParquet: {error}") from error
-    columns = {str(name): frame[name].to_numpy() for name in frame.columns if name != frame.geometry.name}
+        raise InputError(f"{file} cannot be read as GeoParquet: {' '.join(str(error).split())}") from error
+    columns = {}
+    for name in frame.columns:
+        if name != frame.geometry.name:
+            values = frame[name].to_numpy()
+            if values.dtype.kind == "O":
+                values = np.where(frame[name].isna(), None, values)
+            columns[str(name)] = values
     return np.asarray(frame.geometry.array, dtype=object), columns, _crs_text(frame.crs)
 
 
@@ -220,35 +276,42 @@ def _write_ogr(
 ) -> None:
     import pyogrio
     import pyogrio.raw
-    from pyogrio.errors import DataSourceError
+    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
 
-    kinds = {str(kind) for kind in np.unique([shape.geom_type for shape in geometries])} or {"Polygon"}
-    kind = kinds.pop() if len(kinds) == 1 else "Multi" + min(kinds, key=len)
-    values = {name: _storable(column) for name, column in columns.items()}
+    kinds = [_KINDS.get(int(kind), "Unknown") for kind in np.unique(shapely.get_type_id(geometries))] or ["Polygon"]
+    kind = kinds[0] if len(kinds) == 1 else "Multi" + min(kinds, key=len)
     # A GeoPackage stores when it was written; a fixed date makes equal content equal bytes, which scenes rely on.
     pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": "2000-01-01T00:00:00.000Z"})
     try:
-        with warnings.catch_warnings():
-            # A set without CRS is written without one; that is no surprise to whoever made it.
-            warnings.filterwarnings("ignore", message="'crs' was not provided")
+        with _quiet():
             pyogrio.raw.write(
                 file,
                 geometry=shapely.to_wkb(geometries, flavor="iso"),
-                field_data=list(values.values()),
-                fields=np.array(list(values), dtype=object),
-                layer=None if driver == "GeoJSON" and not layer else layer,
+                field_data=[np.ma.getdata(column) for column in columns.values()],
+                fields=np.array(list(columns), dtype=object),
+                layer=layer,
                 driver=driver,
                 geometry_type=kind,
                 promote_to_multi=kind.startswith("Multi"),
                 field_mask=[np.ma.getmaskarray(column) for column in columns.values()] if columns else None,
                 crs=crs,
                 append=append,
-                **({"SPATIAL_INDEX": "NO"} if driver == "FlatGeobuf" and not len(geometries) else {}),
+                # The index of FlatGeobuf would put the rows into another order.
+                **({"SPATIAL_INDEX": "NO"} if driver == "FlatGeobuf" else {}),
             )
-    except DataSourceError as error:
+    except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
         raise OutputError(f"{file.name} cannot be written: {error}") from error
     finally:
         pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": None})
+    if driver == "GeoJSON" and crs is None:
+        _say_no_crs(file)
+
+
+def _say_no_crs(file: Path) -> None:
+    """Add ``"crs": null``, without which a GeoJSON file would say that it is in degrees."""
+    start = '"type": "FeatureCollection",'
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace(start, f'{start}\n"crs": null,', 1), encoding="utf-8")
 
 
 def _write_parquet(
@@ -275,45 +338,32 @@ def _crs_text(crs: Any) -> str | None:
     return ":".join(authority) if authority else str(crs.to_wkt())
 
 
-def _storable(column: NDArray[Any]) -> NDArray[Any]:
-    """Return a column of a type that GDAL knows: text as objects, all integers as int64."""
-    values = np.ma.getdata(column)
-    if values.dtype.kind in "US":
-        return values.astype(object)
-    if values.dtype.kind == "O":
-        return np.array([None if value is None else str(value) for value in values], dtype=object)
-    if values.dtype.kind in "iub" and values.dtype.kind != "b":
-        return values.astype(np.int64)
-    return values
-
-
 def _building_ids(file: Path, columns: Mapping[str, NDArray[Any]], name: str | None) -> NDArray[Any] | None:
     """Return the building of each row; rows without a value get one of their own."""
     if name is None:
         if "building_id" not in columns:
             return None
         name = "building_id"
+    if name not in columns and file.suffix.lower() == ".shp" and name[:10] in columns:
+        name = name[:10]
     if name not in columns:
         raise InputError(
             f"{file} has no column {name!r}{nearest_hint(name, columns)}; it has {', '.join(columns) or 'none'}"
         )
-    labels = columns[name]
-    if labels.dtype.kind in "iu":
-        return labels
-    lacking = np.array([value is None or value != value or value == "" for value in labels], dtype=bool)
-    if labels.dtype.kind == "f" and not lacking.any():
-        return labels
-    texts = np.array([str(value) for value in labels], dtype=object)
-    texts[lacking] = [f"(row {row})" for row in np.flatnonzero(lacking)]
-    return texts.astype(str)
+    return columns[name]
 
 
-def _in_degrees_at_most(file: Path, crs: str | None, geometries: NDArray[np.object_]) -> bool:
-    """Return False for a GeoJSON whose CRS is the WGS 84 of RFC 7946 but whose coordinates cannot be degrees."""
-    if crs != "EPSG:4326" or DRIVERS.get(file.suffix.lower()) != "GeoJSON" or not len(geometries):
+def _means_degrees(file: Path, geometries: NDArray[np.object_]) -> bool:
+    """Return False for a GeoJSON that is taken as WGS 84 (RFC 7946) though it is empty, says null, or cannot be."""
+    if DRIVERS.get(file.suffix.lower()) != "GeoJSON":
         return True
-    xmin, ymin, xmax, ymax = shapely.total_bounds(geometries)
-    return not (max(abs(xmin), abs(xmax)) > 360 or max(abs(ymin), abs(ymax)) > 90)
+    if not len(geometries):
+        return False
+    with file.open(encoding="utf-8", errors="replace") as stream:
+        if re.search(r'"crs"\s*:\s*null', stream.read(4096)):
+            return False
+    bounds = np.abs(shapely.total_bounds(geometries))
+    return not (max(bounds[0], bounds[2]) > 360 or max(bounds[1], bounds[3]) > 90)
 
 
 def _transformed(file: Path, geometries: NDArray[np.object_], crs: str, to_crs: str) -> NDArray[np.object_]:

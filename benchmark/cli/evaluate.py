@@ -12,7 +12,9 @@ __all__ = ["evaluate"]
 
 def evaluate(
     detected: Annotated[str, typer.Argument(help="Detected footprints; 'file.gpkg|layername=NAME' names a layer.")],
-    reference: Annotated[str, typer.Argument(help="Reference footprints.")],
+    reference: Annotated[
+        str, typer.Argument(help="Reference footprints, or a scene folder (its reference, area and pixel grid).")
+    ],
     evaluator: Annotated[
         str, typer.Option("--evaluator", "-e", help="Evaluator, as name or name[parameter=value].")
     ] = "threshold-free",
@@ -29,6 +31,9 @@ def evaluate(
     ] = None,
     building_id: Annotated[
         str | None, typer.Option(help="Reference column that joins the parts of one building.")
+    ] = None,
+    join_gaps: Annotated[
+        float | None, typer.Option(help="Join reference polygons over gaps below this, m: houses of a row to blocks.")
     ] = None,
     crs: Annotated[
         str | None, typer.Option(help="CRS of the files that name none or a wrong one, such as EPSG:25832.")
@@ -49,7 +54,8 @@ def evaluate(
     """
     from ...evaluators.registry import make_evaluator
     from ...reports.evaluation_text import format_evaluation
-    from ...scenes.errors import UnsupportedError
+    from ...scenes.errors import InputError, UnsupportedError
+    from ...scenes.folder import open_scene
     from ...scenes.output import check_target
     from ...scenes.vector_files import read_footprints, read_polygon
 
@@ -60,15 +66,24 @@ def evaluate(
         if target is not None:
             check_target(target, overwrite)
     found = read_footprints(detected, crs=crs)
-    truth = read_footprints(reference, crs=crs, building_id=building_id)
-    boundary = read_polygon(evaluation_area, crs=crs, common_with=truth) if evaluation_area else None
+    scene = open_scene(reference) if Path(reference).is_dir() else None
+    if scene is not None:
+        if scene.reference is None:
+            raise InputError(f"{reference}: the scene has no reference footprints: name a vector file")
+        truth, boundary, grid = scene.reference, scene.area, scene.evaluation_grid
+    else:
+        truth, boundary, grid = read_footprints(reference, crs=crs, building_id=building_id), None, None
+    if evaluation_area:
+        boundary = read_polygon(evaluation_area, crs=crs, common_with=truth)
     if not quiet:
         for footprints in (found, truth):
             for repair in footprints.repairs[:10]:
                 typer.echo(f"{footprints.source}: {repair}", err=True)
             if not len(footprints):
                 typer.echo(f"{footprints.source}: no footprints", err=True)
-    result = judge.evaluate(found, truth, area=boundary)
+    if join_gaps is not None:
+        truth = truth.joined(join_gaps)
+    result = judge.evaluate(found, truth, area=boundary, grid=grid)
     title = f"{_short(detected)} against {_short(reference)}"
     if verdicts is not None or plot is not None:
         objects = result.verdicts
@@ -87,5 +102,5 @@ def evaluate(
 
 
 def _short(path: str) -> str:
-    """Return the file name and layer without the folder."""
-    return path.replace("\\", "/").rpartition("/")[2]
+    """Return the last part of a path, with its layer."""
+    return path.replace("\\", "/").rstrip("/").rpartition("/")[2]

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from ...scenes.errors import RoofbenchError
-from . import evaluate, run, scenes
+from . import detect, evaluate, gate, run, runs, scenes, sweep
 
 __all__ = ["app", "main"]
 
@@ -28,6 +28,15 @@ app = typer.Typer(
 )
 app.command("evaluate")(evaluate.evaluate)
 app.command("run")(run.run)
+app.command("detect")(detect.detect)
+app.command("sweep")(sweep.sweep)
+app.add_typer(gate.baseline_app)
+app.command("gate")(gate.gate)
+app.command("score")(runs.score)
+app.command("ls")(runs.ls)
+app.command("why")(runs.why)
+app.command("export")(runs.export)
+app.command("check-plugin")(detect.check_plugin)
 app.add_typer(scenes.app)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -31,6 +33,7 @@ __all__ = [
     "messages",
     "read_limits",
     "suite_from_words",
+    "table_console",
 ]
 
 DEFAULT_STORE = Path("roofbench.sqlite")
@@ -82,6 +85,14 @@ def messages(quiet: bool = False) -> Console:
     from rich.console import Console
 
     return Console(stderr=True, quiet=quiet, highlight=False)
+
+
+def table_console() -> Console:
+    """Return the console for tables: standard output, wide when it is neither a terminal nor told otherwise."""
+    from rich.console import Console
+
+    told = sys.stdout.isatty() or "COLUMNS" in os.environ
+    return Console(highlight=False, width=None if told else 160)
 
 
 def load_plugins(files: list[Path] | None) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -27,14 +25,13 @@ from .options import (
     messages,
     read_limits,
     suite_from_words,
+    table_console,
 )
+from .progress import run_progress
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ...reports.tables import Leaderboard
-    from ..plan import Plan, PlannedRun
-    from ..tasks import Outcome
+    from ..plan import Plan
 
 
 def run(
@@ -75,10 +72,8 @@ def run(
 
     Exit code 3 when runs failed, 4 when nothing could be measured.
     """
-    from rich.console import Console
-
     from ...reports.tables import print_incidents
-    from ..leaderboard import incidents_of, make_leaderboard
+    from ..leaderboard import incidents_of, make_leaderboard, rank_index
     from ..plan import make_plan, plan_content, suite_from_content
     from ..runner import Execution, run_plan
     from ..store import Store
@@ -100,12 +95,13 @@ def run(
             suite = suite.with_seeds(seeds)
         if scenes is not None:
             suite = suite.with_scenes(scenes)
+        rank_index(suite.evaluators[0], rank_by)
         plan = make_plan(suite, opened, overwrite=overwrite, only_failed=retry_failed)
         if dry_run:
             _print_plan(plan)
             return
         opened.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
-        with _progress(plan, told) as report:
+        with run_progress(plan, told) as report:
             result = run_plan(
                 plan,
                 opened,
@@ -122,7 +118,7 @@ def run(
         for number, board in enumerate(boards):
             if number:
                 typer.echo()
-            board.print(Console(highlight=False, width=None if sys.stdout.isatty() else 160))
+            board.print(table_console())
         print_incidents(incidents_of(result.rows), told)
         if output is not None:
             _write(output, boards)
@@ -142,29 +138,6 @@ def _print_plan(plan: Plan) -> None:
         f"{len(plan.runs)} runs: {counts['detect']} to run, {counts['evaluate']} to evaluate, "
         f"{counts['nothing']} left as stored"
     )
-
-
-@contextmanager
-def _progress(plan: Plan, console: Console) -> Iterator[Callable[[PlannedRun, Outcome], None]]:
-    """Yield what is told of each finished run: a bar on a terminal, otherwise a line for failures only."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    total = plan.counts()["detect"]
-    if not console.is_terminal or console.quiet or not total:
-        yield lambda run, outcome: None
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        bar = progress.add_task("running", total=total)
-
-        def report(run: PlannedRun, outcome: Outcome) -> None:
-            progress.update(bar, advance=1, description=f"{run.identity.label} on {run.identity.scene.name}"[:50])
-            if outcome.status == "failed":
-                progress.console.print(
-                    f"failed {run.identity.label} on {run.identity.scene.name}: {outcome.reason}", markup=False
-                )
-
-        yield report
 
 
 def _write(folder: Path, boards: list[Leaderboard]) -> None:

@@ -39,6 +39,8 @@ __all__ = ["PAPER_PIXEL", "LineDetector", "Rasters"]
 
 #: Ground sampling distance that the 2010 paper's pixel counts refer to, metres.
 PAPER_PIXEL = 0.15
+#: Root mean square distance from its line at which a segment must have missed a corner, point spacings.
+_MISSED_CORNER = 0.8
 #: Threshold that no mean reaches: entropy is not used.
 _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
 
@@ -108,6 +110,11 @@ class LineDetector(Detector):
         157.0, unit="deg", minimum=90, maximum=180,
         doc="interior angles from this to its explement (203) are no corner", source="CPDA, 2009",
     )  # fmt: skip
+    missed_corner: float | None = parameter(
+        None, unit="m", minimum=0.01,
+        doc="root mean square distance of a curve from its line above which it is split; none: 0.8 point spacings",
+        source="not in the print; 1000 is none",
+    )  # fmt: skip
     inside_reach: float = parameter(
         3.0,
         unit="px of 0.15 m",
@@ -151,6 +158,10 @@ class LineDetector(Detector):
     inside_margin: float | None = parameter(
         None, unit="m", minimum=0,
         doc="how far outside a rectangle a line counts as in it; none: point spacing + a pixel; not in the print",
+        source="2010, 3.3.3; reading",
+    )  # fmt: skip
+    inside_share: float = parameter(
+        0.75, minimum=0, maximum=1, doc="share of its length by which a line whose midpoint is in a rectangle is in it",
         source="2010, 3.3.3; reading",
     )  # fmt: skip
     reduction: float = parameter(
@@ -262,7 +273,10 @@ class LineDetector(Detector):
             product=self.corner_product,
             straight=(self.corner_angle, 360.0 - self.corner_angle),
         )
-        segments = fit_segments(curves, points, corners, offsets, shortest=self.minimum_side / gsd)
+        missed = _MISSED_CORNER * rasters.spacing if self.missed_corner is None else self.missed_corner
+        segments = fit_segments(
+            curves, points, corners, offsets, shortest=self.minimum_side / gsd, deviation=missed / gsd
+        )
         reach = max(1.0, self.inside_reach * PAPER_PIXEL / gsd)
         lines = inside_first(segments.lines, black, reach=reach, outset=0.5)
         fates = np.full(len(lines), Fate.RECTANGLE, dtype=np.int64)
@@ -286,6 +300,7 @@ class LineDetector(Detector):
             self.initial_width / gsd,
             self.minimum_side / gsd,
             rasters.spacing / gsd + 1.0 if self.inside_margin is None else self.inside_margin / gsd,
+            self.inside_share,
         )
         fates[alive[made < 0]] = np.where(made[made < 0] == INSIDE, Fate.INSIDE, Fate.NARROW)
         rules = FinalRules(

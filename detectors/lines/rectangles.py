@@ -44,6 +44,7 @@ def initial_rectangles(
     depth: float,
     least_side: float,
     margin: float,
+    inside_share: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Grow a rectangle from each line that is not yet inside one.
 
@@ -57,6 +58,8 @@ def initial_rectangles(
         A rectangle with a shorter side is dropped, pixels.
     margin : float
         How far outside a rectangle a line still counts as inside, pixels: an extension ends up to a step short.
+    inside_share : float
+        Share of its length by which a line whose midpoint is inside counts as inside.
 
     Returns
     -------
@@ -70,7 +73,7 @@ def initial_rectangles(
     for i in order:
         inside = False
         for j in range(found):
-            if share_inside(lines[i], rectangles[j], margin) >= 0.5:
+            if share_inside(lines[i], rectangles[j], margin) >= inside_share:
                 inside = True
                 break
         if inside:

@@ -76,6 +76,47 @@ def fit_line(points: NDArray[np.float64], first: int, count: int, start: int, n:
 
 
 @njit(cache=True)
+def _deviation(
+    points: NDArray[np.float64], first: int, count: int, start: int, n: int, line: NDArray[np.float64]
+) -> tuple[float, int]:
+    """Return the root mean square distance of a piece of curve from a line, and its farthest point (0..count - 1)."""
+    total, farthest, most = 0.0, 0, -1.0
+    for k in range(count):
+        at = start + (first + k) % n
+        off = (points[at, 1] - line[OY]) * line[UX] - (points[at, 0] - line[OX]) * line[UY]
+        total += off * off
+        if abs(off) > most:
+            farthest, most = k, abs(off)
+    return math.sqrt(total / count), farthest
+
+
+@njit(cache=True)
+def _fit_pieces(
+    points: NDArray[np.float64],
+    first: int,
+    count: int,
+    start: int,
+    n: int,
+    shortest: float,
+    deviation: float,
+    lines: list[NDArray[np.float64]],
+) -> None:
+    """Append the lines of a piece of curve, split at its farthest point for as long as it deviates too much."""
+    waiting = [(first, count)]
+    while len(waiting) > 0:
+        piece, length = waiting.pop()
+        if length < 2:
+            continue
+        line = fit_line(points, piece, length, start, n)
+        off, farthest = _deviation(points, piece, length, start, n, line)
+        if off > deviation and 0 < farthest < length - 1:
+            waiting.append((piece + farthest, length - farthest))
+            waiting.append((piece, farthest + 1))
+        elif line[U1] - line[U0] >= shortest:
+            lines.append(line)
+
+
+@njit(cache=True)
 def _fit_all(
     points: NDArray[np.float64],
     offsets: NDArray[np.int64],
@@ -83,10 +124,10 @@ def _fit_all(
     corners: NDArray[np.int64],
     corner_offsets: NDArray[np.int64],
     shortest: float,
+    deviation: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    most = len(corners) + len(offsets)
-    lines, owner = np.empty((most, 8)), np.empty(most, dtype=np.int64)
-    found = 0
+    lines = [np.empty(8) for _ in range(0)]
+    owner = [0 for _ in range(0)]
     for i in range(len(offsets) - 1):
         start, n = offsets[i], offsets[i + 1] - offsets[i]
         ends = corners[corner_offsets[i] : corner_offsets[i + 1]]
@@ -101,13 +142,14 @@ def _fit_all(
                 first = ends[j - 1] if j > 0 else 0
                 last = ends[j] if j < len(ends) else n - 1
                 count = last - first + 1
-            if count < 2:
-                continue
-            line = fit_line(points, first, count, start, n)
-            if line[U1] - line[U0] >= shortest:
-                lines[found], owner[found] = line, i
-                found += 1
-    return lines[:found].copy(), owner[:found].copy()
+            before = len(lines)
+            _fit_pieces(points, first, count, start, n, shortest, deviation, lines)
+            for _ in range(len(lines) - before):
+                owner.append(i)
+    packed = np.empty((len(lines), 8))
+    for k in range(len(lines)):
+        packed[k] = lines[k]
+    return packed, np.array(owner, dtype=np.int64)
 
 
 def fit_segments(
@@ -117,12 +159,25 @@ def fit_segments(
     corner_offsets: NDArray[np.int64],
     *,
     shortest: float,
+    deviation: float = math.inf,
 ) -> Segments:
-    """Fit a line to each piece between corners; lines shorter than `shortest` pixels are left out.
+    """Fit a line to each piece between corners.
 
     A closed curve with fewer than two corners has no straight piece.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        The smoothed points of the curves.
+    corners, corner_offsets
+        As `find_corners` returns them.
+    shortest : float
+        Shorter lines are left out, pixels.
+    deviation : float
+        A piece whose root mean square distance from its line is larger has a corner that was missed, and is split where
+        it is farthest from the line, pixels.
     """
-    lines, owner = _fit_all(points, curves.offsets, curves.closed, corners, corner_offsets, shortest)
+    lines, owner = _fit_all(points, curves.offsets, curves.closed, corners, corner_offsets, shortest, deviation)
     return Segments(lines, curves.shapes[owner])
 
 

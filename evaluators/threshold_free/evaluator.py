@@ -292,7 +292,8 @@ def _counts(
     both = counted_detections[within.first] & counted_detections[within.second]
     one, two = within.first[both], within.second[both]
     # Natural overlap: two true positives on two parts of one building (a reference has one partner, so parts differ).
-    natural = matched[one] & matched[two] & (building[partner[one]] == building[partner[two]])
+    natural = matched[one] & matched[two]
+    natural[natural] = building[partner[one[natural]]] == building[partner[two[natural]]]
     overlapping = np.union1d(one[~natural], two[~natural])
 
     touched = np.unique(np.stack([overlaps.first, building[overlaps.second]], axis=1), axis=0)[:, 0]

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from ..errors import ParameterError
 from ..raster import Elevation
-from .layout import HALLS, TOWERS, Sites
+from .layout import HALLS, TOWERS
 from .palettes import PALETTES, draw_colour
+from .parcels import Sites
 from .recipe import SceneParameters
 from .roofscape import furnish
 from .solids import Roof, Solid, Texture
@@ -59,7 +60,7 @@ class Parcel:
     Attributes
     ----------
     x, y, angle, facing : float
-        As in `layout.Sites`.
+        As in `parcels.Sites`.
     width, depth : float
         Metres.
     """
@@ -294,52 +295,49 @@ def _hall(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> list[list[So
 
 
 def _tower(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> list[list[Solid]]:
-    """Compose a downtown building: low blocks, slabs, and podiums with a tower on them."""
+    """Compose a downtown building: low blocks with wings or a court, slabs, stepped towers, towers on a podium."""
     size = min(recipe.building_size, 1.1)
-    gap = min(recipe.gap, parcel.width / 3)
-    width = (parcel.width - gap * draws.between(0.8, 1.6)) * size
-    deep = (parcel.depth - draws.between(2.5, 7)) * size
-    front = -parcel.depth / 2 + draws.between(1, 3)
-    kind, rank = draws.unit(), draws.unit()
-    turn = math.radians(min(recipe.orientation_spread, 5) * draws.normal())
-    low = draws.between(6, 24)
+    width = max(parcel.width - min(recipe.gap, parcel.width / 3) * draws.between(0.5, 1.6), 8) * size
+    deep = max(parcel.depth - draws.between(3, 9), 8) * size
+    front = -parcel.depth / 2 + draws.between(1.5, 4)
+    kind, rank, low = draws.unit(), draws.unit(), draws.between(6, 26)
     # A downtown's heights are skewed: many blocks of ten to thirty metres, few towers.
-    high = 18 + (recipe.tallest - 18) * rank**2.2
-    if kind < 0.28:
-        return [[parcel.place(0, front + deep / 2, width, deep, eave=low, turn=turn)]]
-    if kind < 0.44:
-        cut = draws.between(0.4, 0.6)
-        side = 1.0 if draws.chance(0.5) else -1.0
-        wing = width * draws.between(0.35, 0.5)
-        body = parcel.place(0, front + deep * cut / 2, width, deep * cut, eave=low, turn=turn)
-        annex = parcel.place(
-            side * (width - wing) / 2, front + deep / 2, wing, deep, eave=low * draws.between(0.8, 1.25), turn=turn
-        )
-        return [[body, annex]]
-    if kind < 0.56:
-        cut, wing = draws.between(0.34, 0.45), width * draws.between(0.26, 0.34)
-        parts = [parcel.place(0, front + deep * cut / 2, width, deep * cut, eave=low, turn=turn)]
-        parts += [
-            parcel.place(side * (width - wing) / 2, front + deep / 2, wing, deep, eave=low, turn=turn)
-            for side in (-1, 1)
+    high = 18 + (recipe.tallest - 18) * rank**2.4
+    more = {"turn": math.radians(min(recipe.orientation_spread, 5) * draws.normal())}
+    side = 1.0 if draws.chance(0.5) else -1.0
+    wing, cut = draws.between(0.24, 0.36), draws.between(0.34, 0.5)
+
+    def part(a: float, b: float, along: float, behind: float, eave: float) -> Solid:
+        """Place a part; a and b are shares of the building, b from its front."""
+        return parcel.place(a * width, front + b * deep, along * width, behind * deep, eave=eave, **more)
+
+    if kind < 0.14:
+        return [[part(0, 0.5, 1, 1, low)]]
+    if kind < 0.26:
+        return [
+            [part(0, cut / 2, 1, cut, low), part(side * (0.5 - wing / 2), 0.5, wing, 1, low * draws.between(0.8, 1.3))]
         ]
-        return [parts]
-    if kind < 0.74:
-        slab = min(draws.between(16, 22), deep)
-        return [[parcel.place(0, front + slab / 2, width, slab, eave=high * 0.75 + 4, turn=turn)]]
-    podium = draws.between(6, 18)
-    across, behind = width * draws.between(0.5, 0.75), deep * draws.between(0.45, 0.7)
-    parts = [
-        parcel.place(0, front + deep / 2, width, deep, eave=podium, turn=turn),
-        parcel.place(
-            (width - across) / 2 * draws.between(-0.8, 0.8),
-            front + deep * 0.5,
-            across,
-            behind,
-            eave=max(high, podium + 9),
-            turn=turn,
-        ),
-    ]
+    if kind < 0.36:
+        return [[part(0, cut / 2, 1, cut, low), *(part(s * (0.5 - wing / 2), 0.5, wing, 1, low) for s in (-1, 1))]]
+    if kind < 0.46:
+        wing *= 0.85
+        court = [part(s * (0.5 - wing / 2), 0.5, wing, 1, low) for s in (-1, 1)]
+        return [
+            [part(0, wing / 2, 1, wing, low), *court, part(0, 1 - wing / 2, 1, wing, low * draws.between(0.8, 1.2))]
+        ]
+    if kind < 0.58:
+        slab = min(draws.between(16, 22) / deep, 1.0)
+        return [[part(0, slab / 2, 1, slab, high * 0.7 + 6), part(side * 0.25, 0.5, 0.5, 1, min(low, 12.0))]]
+    if kind < 0.72:
+        steps = [part(0, 0.5, 1 - 0.16 * k, 1 - 0.16 * k, high * 0.8 * (0.45 + 0.22 * k) + 4) for k in range(3)]
+        return [steps]
+    podium = draws.between(6, 20)
+    across, behind = draws.between(0.42, 0.7), draws.between(0.42, 0.68)
+    shift = (0.5 - across / 2) * draws.between(-0.85, 0.85)
+    parts = [part(0, 0.5, 1, 1, podium), part(shift, 0.5, across, behind, max(high, podium + 9))]
+    if draws.chance(0.35) and width > 45:
+        parts[1] = part(-0.28, 0.5, 0.34, behind, max(high, podium + 9))
+        parts.append(part(0.28, 0.46, 0.34, behind * 0.9, max(high * 0.8, podium + 6)))
     return [parts]
 
 

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .buildings import Draws, Parcel, Town
-from .layout import HALLS, HOUSES, Layout, Sites
+from .layout import HALLS, HOUSES, Layout
 from .palettes import PALETTES, draw_colour, shaded
+from .parcels import Sites
 from .recipe import SceneParameters
 from .solids import Body, Roof, Solid, Texture
 from .streams import stream
@@ -37,6 +38,9 @@ class Cover(enum.IntEnum):
     POOL = 4
     EARTH = 5
     PLAZA = 6
+    STUBBLE = 7
+    MAIZE = 8
+    VINES = 9
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,7 @@ def scatter(
         elif zone == HALLS:
             things, grounds = _yard(parcel, recipe, draws)
         else:
-            things, grounds = _forecourt(parcel, recipe, draws)
+            things, grounds = _forecourt(parcel, recipe, draws, bool(town.built[site]))
         solids += things
         patches += grounds
     solids += _parked(layout, recipe, seed)
@@ -195,17 +199,20 @@ def _yard(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> tuple[list[S
     return things, grounds
 
 
-def _forecourt(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> tuple[list[Solid], list[Patch]]:
+def _forecourt(parcel: Parcel, recipe: SceneParameters, draws: Draws, built: bool) -> tuple[list[Solid], list[Patch]]:
     ground = parcel.place(0, 0, parcel.width, parcel.depth)
     plaza, green = draws.unit(), draws.unit()
     things: list[Solid] = []
-    if plaza < 0.55:
+    if plaza < (0.85 if built else 0.15):
         return things, [_patch(ground, Cover.PLAZA)]
     if green < 0.35:
         return things, []
-    for k in range(int((parcel.width - 4) / 2.8)):
-        if k < 14 and draws.chance(0.45 * min(recipe.clutter, 2)):
-            things += _car(parcel, -parcel.width / 2 + 3 + 2.8 * k, parcel.depth / 2 - 4, math.pi / 2, draws)
+    # A car park: rows of cars across the parcel.
+    for row in range(2):
+        for k in range(min(int((parcel.width - 4) / 2.8), 14)):
+            if draws.chance(0.5 * min(recipe.clutter, 2)):
+                a, b = -parcel.width / 2 + 3 + 2.8 * k, (0.5 - row) * 0.6 * parcel.depth
+                things += _car(parcel, a, b, math.pi / 2, draws)
     return things, [_patch(ground, Cover.ASPHALT)]
 
 

@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 
 from ..raster import Grid
 from .clutter import Cover
-from .layout import HALLS, TOWERS, locate
+from .layout import FIELDS, HALLS, PARK, TOWERS, locate, zone_of
+from .parcels import HALL_WIDTH
 from .streams import uniform
 from .world import World, ground_at
 
 __all__ = ["GRASS", "cover_codes"]
 
 GRASS = 64
-_PARK = 3
 _ASPHALT, _FOOTPATH, _EARTH, _PLAZA = map(int, (Cover.ASPHALT, Cover.FOOTPATH, Cover.EARTH, Cover.PLAZA))
+_GRAVEL, _STUBBLE, _MAIZE, _VINES = map(int, (Cover.GRAVEL, Cover.STUBBLE, Cover.MAIZE, Cover.VINES))
 
 
 def cover_codes(world: World, grid: Grid) -> NDArray[np.uint8]:
@@ -68,13 +69,24 @@ def _streets(
             pu = ground_at(u, raster[0], raster[1], raster[2], x, y)
             pv = ground_at(v, raster[0], raster[1], raster[2], x, y)
             block, row, along, across = locate(pu, pv, pattern, key)
-            i = min(max(block - first[0], 0), zones.shape[0] - 1)
-            j = min(max(row - first[1], 0), zones.shape[1] - 1)
-            zone = zones[i, j]
+            zone = zone_of(block, row, zones, first)
             main = street / 2 - min(across, period - across)  # depth into the street, negative on parcels
             side = cross / 2 - min(along, length - along)
-            if main > 0 or side > 0:
+            if (main > 0 or side > 0) and zone == FIELDS:
+                # A road where houses stand on its other side, a track where fields lie on both.
+                beyond = zone_of(block, row + (1 if across > period / 2 else -1), zones, first) if main > 0 else FIELDS
+                if beyond == FIELDS:
+                    main, side = main - street / 2 + 1.6, side - cross / 2 + 1.6
+                    if main > 0 or side > 0:
+                        codes[r, c] = _GRAVEL
+                    else:
+                        codes[r, c] = _field_code(block, row, along, across, pattern, key)
+                else:
+                    codes[r, c] = _street_code(main, street, side, cross, zone)
+            elif main > 0 or side > 0:
                 codes[r, c] = _street_code(main, street, side, cross, zone)
+            elif zone == FIELDS:
+                codes[r, c] = _field_code(block, row, along, across, pattern, key)
             else:
                 codes[r, c] = _parcel_code(block, row, along, across, pattern, key, zone, dryness)
 
@@ -98,18 +110,28 @@ def _parcel_code(
 ) -> int:
     """Grass of a parcel, drier on some; earth on a few."""
     usable = pattern[1] - pattern[3]
-    wide = pattern[7] * (3.2 if zone == HALLS else 1.0)
+    wide = pattern[7] * (HALL_WIDTH if zone == HALLS else 1.0)
     count = max(1, round(usable / wide))
     lot = int((along - pattern[3] / 2) / usable * count)
     half = 0 if across < pattern[0] / 2 or zone == HALLS else 1
-    if zone == _PARK:
+    if zone == PARK:
         lot, half = 0, 0
     counter = ((block & 0xFFFF) << 32) | ((row & 0xFFFF) << 16) | ((lot & 0xFF) << 1) | half
     draw, bare = uniform(key, counter), uniform(key, counter + (1 << 60))
-    if bare < 0.05 and zone != _PARK:
+    if bare < 0.05 and zone != PARK:
         return _EARTH
     dry = min(max(dryness + (draw - 0.5) * 0.9, 0.0), 1.0)
     return GRASS + int(dry * 63)
+
+
+@njit(cache=True)
+def _field_code(block: int, row: int, along: float, across: float, pattern: NDArray[np.float64], key: int) -> int:
+    """Crop of a field: strips of a block are meadow, stubble, ploughed, maize or vines."""
+    strip = int(across / pattern[0] * 3.0) if uniform(key, block * 31 + row) < 0.5 else int(along / pattern[1] * 3.0)
+    draw = uniform(key, (1 << 50) + block * 7919 + row * 104729 + strip)
+    if draw < 0.5:
+        return GRASS + 6 + int(draw * 50)
+    return _STUBBLE if draw < 0.68 else _EARTH if draw < 0.8 else _MAIZE if draw < 0.92 else _VINES
 
 
 @njit(cache=True)

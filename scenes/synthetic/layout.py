@@ -1,4 +1,4 @@
-"""Streets, blocks and parcels: where buildings may stand and which way they look.
+"""Streets, blocks and zones: the pattern that parcels, ground cover and trees follow.
 
 Nouns
 -----
@@ -8,14 +8,14 @@ layout coordinates
 row, block
     Street centre lines lie at v = j * period; a row is what lies between two of them and is cut into blocks by cross
     streets, whose position differs from row to row (*stagger*). A block holds two rows of parcels back to back.
-site
-    A parcel on which one house, hall or tower may stand; its *front* faces the street.
+zone
+    What a block is used for: houses, halls (industry), towers (downtown), park, or fields around a village.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -25,9 +25,9 @@ from ..raster import Elevation, Grid
 from .recipe import SceneParameters
 from .streams import counter_key, fractal_field, stream, uniform
 
-__all__ = ["HALLS", "HOUSES", "PARK", "TOWERS", "Layout", "Sites", "locate", "plan_layout", "plan_sites"]
+__all__ = ["FIELDS", "HALLS", "HOUSES", "PARK", "TOWERS", "Layout", "locate", "plan_layout", "zone_of"]
 
-HOUSES, HALLS, TOWERS, PARK = 0, 1, 2, 3
+HOUSES, HALLS, TOWERS, PARK, FIELDS = 0, 1, 2, 3, 4
 _CELL = 4.0
 _MARGIN = 80.0
 
@@ -70,6 +70,13 @@ class Layout:
             x, y = x + cosine * du - sine * dv, y + sine * du + cosine * dv
         return x, y
 
+    def block_start(self, i: int, j: int) -> tuple[float, float]:
+        """Return the layout coordinates of the lower corner of block ``zones[i, j]``, street axes included."""
+        row = self.first[1] + j
+        shift = float(self.pattern[6] * uniform(self.key, row) * self.pattern[1])
+        u = float(self.pattern[4]) + shift + (self.first[0] + i) * float(self.pattern[1])
+        return u, float(self.pattern[5] + row * self.pattern[0])
+
     @property
     def _turn(self) -> tuple[float, float]:
         return float(self.pattern[8]), float(self.pattern[9])
@@ -86,38 +93,6 @@ class Layout:
         return raster.sample(inside_x, inside_y) + along[0] * (x - inside_x) + along[1] * (y - inside_y)
 
 
-@dataclass(frozen=True)
-class Sites:
-    """Parcels, one row each.
-
-    Attributes
-    ----------
-    x, y : ndarray, shape (n,)
-        Centre, local world coordinates, metres.
-    angle : ndarray, shape (n,)
-        Direction of the street, radians from east.
-    facing : ndarray, shape (n,)
-        +1 when the back lies to the left of the street direction, -1 when to the right.
-    width, depth : ndarray, shape (n,)
-        Along and across the street, metres.
-    zone : ndarray of uint8, shape (n,)
-    mark : ndarray, shape (n,)
-        Order in which sites are built on, ascending.
-    """
-
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    angle: NDArray[np.float64]
-    facing: NDArray[np.float64]
-    width: NDArray[np.float64]
-    depth: NDArray[np.float64]
-    zone: NDArray[np.uint8]
-    mark: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.x)
-
-
 @njit(cache=True)
 def locate(u: float, v: float, pattern: NDArray[np.float64], key: int) -> tuple[int, int, float, float]:
     """Return block number, row number, and the position in the block: along from its start, across from its street."""
@@ -126,6 +101,14 @@ def locate(u: float, v: float, pattern: NDArray[np.float64], key: int) -> tuple[
     shifted = u - pattern[4] - pattern[6] * uniform(key, row) * pattern[1]
     block = math.floor(shifted / pattern[1])
     return int(block), int(row), shifted - block * pattern[1], across
+
+
+@njit(cache=True)
+def zone_of(block: int, row: int, zones: NDArray[np.uint8], first: NDArray[np.int64]) -> int:
+    """Return the zone of a block; blocks beyond the table are like the nearest in it."""
+    i = min(max(block - first[0], 0), zones.shape[0] - 1)
+    j = min(max(row - first[1], 0), zones.shape[1] - 1)
+    return int(zones[i, j])
 
 
 def plan_layout(recipe: SceneParameters, seed: int) -> Layout:
@@ -138,15 +121,19 @@ def plan_layout(recipe: SceneParameters, seed: int) -> Layout:
     phase = rng.random(2)
     bend = [fractal_field(rng, grid.shape, _CELL, (190.0, 95.0), 0.25) * recipe.winding for _ in range(2)]
     period, block = 2 * recipe.parcel_depth + recipe.street_width, recipe.block_length + recipe.street_width
-    stagger = 0.0 if recipe.zone == "towers" else 1.0
     u = Elevation(cosine * x + sine * y + bend[0], grid)  # type: ignore[arg-type]
     v = Elevation(-sine * x + cosine * y + bend[1], grid)  # type: ignore[arg-type]
-    # A street passes near the centre, so that small extents hold about as many parcels with any seed.
-    middle = float(v.sample(recipe.width / 2, recipe.height / 2)) + 0.16 * (phase[1] - 0.5) * period
+    # A street of houses, or a block of towers, lies about the centre: small extents hold as many parcels with any seed.
+    downtown = recipe.zone == "towers"
+    origin_v = float(v.sample(recipe.width / 2, recipe.height / 2)) + 0.16 * (phase[1] - 0.5) * period
+    origin_u = phase[0] * block
+    if downtown:
+        origin_v -= period / 2
+        origin_u = float(u.sample(recipe.width / 2, recipe.height / 2)) + (0.16 * phase[0] - 0.58) * block
     pattern = np.array(
         (
-            *(period, block, recipe.street_width, recipe.street_width * (0.75 if stagger else 1.0)),
-            *(phase[0] * block, middle, stagger, recipe.parcel_width, cosine, sine),
+            *(period, block, recipe.street_width, recipe.street_width * (1.0 if downtown else 0.75)),
+            *(origin_u, origin_v, 0.0 if downtown else 1.0, recipe.parcel_width, cosine, sine),
         )
     )
     first = (
@@ -157,77 +144,34 @@ def plan_layout(recipe: SceneParameters, seed: int) -> Layout:
         math.floor((u.values.max() - pattern[4]) / block) - first[0] + 2,
         math.floor((v.values.max() - pattern[5]) / period) - first[1] + 2,
     )
-    return Layout(u, v, pattern, counter_key(seed, "streets"), _zones(recipe, seed, shape), first)
+    unused = np.zeros(shape, dtype=np.uint8)
+    layout = Layout(u, v, pattern, counter_key(seed, "streets"), unused, first)
+    return replace(layout, zones=_zones(layout, recipe, seed))
 
 
-def _zones(recipe: SceneParameters, seed: int, shape: tuple[int, int]) -> NDArray[np.uint8]:
-    """Industry gathers on one side of the scene; parks lie anywhere."""
+def _zones(layout: Layout, recipe: SceneParameters, seed: int) -> NDArray[np.uint8]:
+    """Industry gathers on one side of the scene, fields lie around a village, parks anywhere."""
     rng = stream(seed, "zones")
-    direction = rng.random(2) - 0.5
-    i, j = np.indices(shape)
-    towards = i / max(shape[0], 1) * direction[0] + j / max(shape[1], 1) * direction[1]
-    pull = _ranks(towards / np.hypot(*direction) + 0.25 * rng.random(shape))
-    park = rng.random(shape) < recipe.park_share
-    built = TOWERS if recipe.zone == "towers" else HOUSES
-    zones = np.where(pull < recipe.hall_share, HALLS, built)
-    return np.where(park & (zones != HALLS), PARK, zones).astype(np.uint8)
+    shape = layout.zones.shape
+    direction, core = rng.random(2) - 0.5, 0.35 + 0.3 * rng.random(2)
+    noise, park = rng.random(shape), rng.random(shape)
+    starts = np.array([[layout.block_start(i, j) for j in range(shape[1])] for i in range(shape[0])])
+    half = layout.pattern[1] / 2, layout.pattern[0] / 2
+    x, y = layout.to_world(starts[..., 0] + half[0], starts[..., 1] + half[1])
+    x, y = x / recipe.width, y / recipe.height
+    inside = (np.abs(x - 0.5) < 0.55) & (np.abs(y - 0.5) < 0.55)
+    towards = (x * direction[0] + y * direction[1]) / np.hypot(*direction) + 0.12 * noise
+    away = np.hypot(x - core[0], y - core[1]) + 0.10 * noise
+    zones = np.full(shape, TOWERS if recipe.zone == "towers" else HOUSES, dtype=np.uint8)
+    zones[_lowest(park, inside, recipe.park_share)] = PARK
+    zones[_lowest(towards, inside, recipe.hall_share)] = HALLS
+    zones[_lowest(-away, inside, recipe.open_share)] = FIELDS
+    return zones
 
 
-def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    order = np.argsort(values, axis=None, kind="stable")
-    ranks = np.empty(values.size)
-    ranks[order] = np.arange(values.size) / values.size
-    return ranks.reshape(values.shape)
-
-
-def plan_sites(layout: Layout, recipe: SceneParameters, seed: int) -> Sites:
-    """List the parcels whose centre lies in the extent, in a fixed order."""
-    columns: list[tuple[float, ...]] = []
-    period, block, street, cross = layout.pattern[:4]
-    depth = (period - street) / 2
-    usable = block - cross
-    for i in range(layout.zones.shape[0]):
-        for j in range(layout.zones.shape[1]):
-            zone = int(layout.zones[i, j])
-            if zone == PARK:
-                continue
-            row = layout.first[1] + j
-            start = layout.pattern[4] + layout.pattern[6] * uniform(layout.key, row) * block
-            start += (layout.first[0] + i) * block + cross / 2
-            front = layout.pattern[5] + row * period + street / 2
-            wide = recipe.parcel_width * (3.2 if zone == HALLS else 1.0)
-            count = max(1, round(usable / wide))
-            # A hall's parcel reaches from street to street, others lie back to back.
-            rows = (
-                ((depth, 1.0, 2 * depth),) if zone == HALLS else ((depth / 2, 1.0, depth), (depth * 1.5, -1.0, depth))
-            )
-            for across, facing, deep in rows:
-                for lot in range(count):
-                    centre = start + (lot + 0.5) * usable / count
-                    columns.append((centre, front + across, facing, usable / count, deep, zone))
-    table = np.array(columns, dtype=np.float64).reshape(-1, 6)
-    x, y = layout.to_world(table[:, 0], table[:, 1])
-    ahead_x, ahead_y = layout.to_world(table[:, 0] + 1.0, table[:, 1])
-    mark = _marks(recipe, seed, x, y)
-    inside = (x > 0) & (x < recipe.width) & (y > 0) & (y < recipe.height)
-    return Sites(
-        x=x[inside],
-        y=y[inside],
-        angle=np.arctan2(ahead_y - y, ahead_x - x)[inside],
-        facing=table[inside, 2],
-        width=table[inside, 3],
-        depth=table[inside, 4],
-        zone=table[inside, 5].astype(np.uint8),
-        mark=mark[inside],
-    )
-
-
-def _marks(recipe: SceneParameters, seed: int, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Order of building: at random in a suburb; a village fills up from its core, with ragged edges."""
-    rng = stream(seed, "sites")
-    mark = rng.random(len(x))
-    if recipe.zone == "village":
-        centre = (0.35 + 0.3 * rng.random(2)) * (recipe.width, recipe.height)
-        away = np.hypot(x - centre[0], y - centre[1]) / np.hypot(recipe.width, recipe.height)
-        mark = away + 0.22 * mark
-    return mark
+def _lowest(values: NDArray[np.float64], inside: NDArray[np.bool_], share: float) -> NDArray[np.bool_]:
+    """Return which blocks have the lowest values, such that they are a share of those in the extent."""
+    ordered = np.sort(values[inside])
+    count = round(share * len(ordered))
+    chosen: NDArray[np.bool_] = values <= ordered[count - 1] if count else np.zeros(values.shape, dtype=bool)
+    return chosen

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .clutter import Cover
 from .palettes import GROUND, LAWNS
 from .recipe import SceneParameters
 from .solids import Texture
@@ -23,6 +24,9 @@ AMBIENT: NDArray[np.float32] = np.array((0.34, 0.37, 0.42, 0.26), dtype=np.float
 _TILES, _CORRUGATED, _GRAVEL, _PLANTED, _LEAVES = (
     int(look) for look in (Texture.TILES, Texture.CORRUGATED, Texture.GRAVEL, Texture.PLANTED, Texture.LEAVES)
 )
+
+
+_PLAZA, _VINES = int(Cover.PLAZA), int(Cover.VINES)
 
 
 def sun_vector(recipe: SceneParameters) -> tuple[float, float, float]:
@@ -105,6 +109,7 @@ def colour_surface(
         GROUND,
         LAWNS,
         AMBIENT,
+        (float(world.layout.pattern[8]), float(world.layout.pattern[9])),
     )
     return colours
 
@@ -132,6 +137,7 @@ def _paint(
     ground: NDArray[np.float32],
     lawns: NDArray[np.float32],
     ambient: NDArray[np.float32],
+    turn: tuple[float, float],
 ) -> None:
     west, north, gsd = frame
     bands, rows, columns = colours.shape
@@ -147,7 +153,8 @@ def _paint(
             # Coarse noise is tied to metres: one cell of the tile is 0.25 m.
             patchy = coarse[int(y * 4.0 + 4096) & wide, int(x * 4.0 + 4096) & wide]
             if mark == 0:
-                direct = _ground_albedo(albedo, codes[r, c], x, y, grain, patchy, ground, lawns)
+                drill = turn[0] * y - turn[1] * x  # across the drills of a field
+                direct = _ground_albedo(albedo, codes[r, c], drill, grain, patchy, ground, lawns)
                 r1, c1 = max(r - 1, 0), max(c - 1, 0)
                 if label[r1, c] == 0 and label[r, c1] == 0:
                     dzdx = (z[r, c] - z[r, c1]) / gsd
@@ -172,8 +179,7 @@ def _paint(
 def _ground_albedo(
     albedo: NDArray[np.float64],
     code: int,
-    x: float,
-    y: float,
+    drill: float,
     grain: float,
     patchy: float,
     ground: NDArray[np.float32],
@@ -188,6 +194,10 @@ def _ground_albedo(
     else:
         rough = 0.03 if code < 3 else 0.06
         factor = 1.0 + rough * grain + 0.05 * patchy
+        if code == _VINES:
+            factor *= 0.72 if (drill * 0.5) % 1.0 < 0.45 else 1.12
+        elif code > _PLAZA:
+            factor *= 1.0 + 0.10 * (((drill * 0.33) % 1.0) - 0.5)
         for b in range(4):
             albedo[b] = ground[code, b] * factor
     return 1.0

@@ -136,8 +136,8 @@ _KNOX: dict[str, Any] = {
 }
 _TORONTO: dict[str, Any] = {
     "epsg": 32617, "elevation": 76, "slope": 0.4, "aspect": 75, "undulation": 3, "orientation": -17,
-    "orientation_spread": 0.3, "zone": "towers", "street_width": 24, "block_length": 130, "parcel_width": 46,
-    "parcel_depth": 46, "setback": 0, "outbuildings": 0, "gap": 8, "park_share": 0.06, "tallest": 190,
+    "orientation_spread": 0.3, "zone": "towers", "street_width": 24, "block_length": 140, "parcel_width": 45,
+    "parcel_depth": 44, "setback": 0, "outbuildings": 0, "gap": 8, "park_share": 0.06, "tallest": 190,
     "roof_palette": "north-american", "tree_density": 9, "tree_height": 7, "tree_gap": 2.5, "autumn_share": 0.2,
     "pulse": "all", "bands": "rgb", "gsd": 0.25, "view_angle": 8, "scan_angle": 10, "sun_azimuth": 150,
     "sun_elevation": 50, "horizontal_noise": 0.15,
@@ -151,7 +151,7 @@ _VAIHINGEN: dict[str, Any] = {
     "orientation": 33,
     "winding": 22,
     "orientation_spread": 6,
-    "zone": "village",
+    "open_share": 0.6,
     "street_width": 11,
     "block_length": 120,
     "parcel_width": 21,
@@ -185,13 +185,14 @@ _FULL: Mapping[str, dict[str, Any]] = {
     "fairfield": _FAIRFIELD,
     "fairfield-1": _RESIDENTIAL | {"width": 248, "height": 210, "buildings": 70},
     "fairfield-2": _RESIDENTIAL | {"width": 155, "height": 219, "buildings": 62, "parcel_width": 14.8},
-    "fairfield-3": _FAIRFIELD | {"width": 228, "height": 189, "buildings": 60, "undulation": 6},
+    "fairfield-3": _RESIDENTIAL
+    | {"width": 228, "height": 189, "buildings": 60, "parcel_width": 14.5, "hall_share": 0.17},
     "moonee-ponds": _MOONEE_PONDS,
     "knox": _KNOX,
     "toronto-a": _TORONTO | {"width": 831, "height": 831, "buildings": 130, "point_spacing": 0.639},
     "toronto-b": _TORONTO | {"width": 871, "height": 871, "buildings": 153, "point_spacing": 0.639, "orientation": -14},
-    "vaihingen-a": _VAIHINGEN | {"width": 750, "height": 750, "buildings": 263, "point_spacing": 0.4135},
-    "vaihingen-b": _VAIHINGEN | {"width": 731, "height": 731, "buildings": 290, "point_spacing": 0.4135},
+    "vaihingen-a": _VAIHINGEN | {"width": 750, "height": 750, "buildings": 263, "point_spacing": 0.411},
+    "vaihingen-b": _VAIHINGEN | {"width": 731, "height": 731, "buildings": 290, "point_spacing": 0.411},
 }  # fmt: skip
 
 #: Side of a small version, metres, and its buildings.
@@ -202,8 +203,8 @@ _SMALL: Mapping[str, tuple[int, int]] = {
     "fairfield-3": (110, 12),
     "moonee-ponds": (110, 11),
     "knox": (150, 8),
-    "toronto-a": (200, 6),
-    "toronto-b": (200, 7),
+    "toronto-a": (220, 3),
+    "toronto-b": (220, 3),
     "vaihingen-a": (110, 8),
     "vaihingen-b": (110, 9),
 }
@@ -234,5 +235,5 @@ def preset(name: str, **changes: Any) -> SceneParameters:
         side, buildings = _SMALL[full]
         # Relief belongs to a landscape, of which a small scene sees a part.
         values["undulation"] *= side / max(values["width"], values["height"])
-        values |= {"width": side, "height": side, "buildings": buildings, "park_share": 0.0}
+        values |= {"width": side, "height": side, "buildings": buildings, "park_share": 0.0, "open_share": 0.0}
     return SceneParameters.build(values | changes)

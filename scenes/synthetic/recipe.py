@@ -61,8 +61,11 @@ class SceneParameters(Parameterised):
     parcel_width: float = parameter(17.0, unit="m", minimum=8, maximum=150, doc="frontage")
     parcel_depth: float = parameter(36.0, unit="m", minimum=15, maximum=150, doc="from street to back fence")
     setback: float = parameter(6.0, unit="m", minimum=0, maximum=30, doc="from parcel front to house")
-    zone: str = parameter("houses", choices=("houses", "village", "towers"), doc="use of the blocks")
+    zone: str = parameter(
+        "houses", choices=("houses", "towers"), doc="use of the blocks that are neither halls nor open"
+    )
     hall_share: float = parameter(0.0, minimum=0, maximum=1, doc="share of the blocks that are industrial")
+    open_share: float = parameter(0.0, minimum=0, maximum=0.95, doc="share of the blocks that are fields, farthest out")
     park_share: float = parameter(0.04, minimum=0, maximum=0.9, doc="share of the blocks without buildings")
 
     buildings: int = parameter(70, minimum=0, maximum=20000, doc="buildings in the reference, outbuildings included")

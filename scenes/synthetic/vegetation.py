@@ -20,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..raster import Elevation
-from .layout import Layout, locate
+from .layout import FIELDS, Layout, locate, zone_of
 from .palettes import PALETTES, draw_colour
 from .recipe import MOST_TREES, SceneParameters
 from .solids import Body, Solid
@@ -70,7 +70,8 @@ def grow(terrain: Elevation, layout: Layout, buildings: list[Solid], recipe: Sce
     draws = stream(seed, "trees").random((count, 16))
     x, y = _places(draws, layout, recipe)
     away = _distance_to_buildings(x, y, buildings)
-    allowed = (away >= recipe.tree_gap) & ~_on_street(x, y, layout)
+    clumped = draws[:, 10] < max(recipe.tree_clumping, 0.25)
+    allowed = (away >= recipe.tree_gap) & _plantable(x, y, layout, clumped)
     allowed &= (x > -1) & (x < recipe.width + 1) & (y > -1) & (y < recipe.height + 1)
     mark = draws[:, 0] * (1 - 0.85 * recipe.woodland * np.clip((away - 4) / 16, 0, 1))
     order = np.argsort(np.where(allowed, mark, np.inf), kind="stable")
@@ -100,23 +101,33 @@ def _places(
     return x, y
 
 
-def _on_street(x: NDArray[np.float64], y: NDArray[np.float64], layout: Layout) -> NDArray[np.bool_]:
+def _plantable(
+    x: NDArray[np.float64], y: NDArray[np.float64], layout: Layout, clumped: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return where trees may stand: not on asphalt, and in fields only as copses."""
     u, v = layout.u.sample(x, y), layout.v.sample(x, y)
-    street: NDArray[np.bool_] = _carriageway(u, v, layout.pattern, layout.key)
-    return street
+    free: NDArray[np.bool_] = _off_road(u, v, clumped, layout.pattern, layout.key, layout.zones, np.array(layout.first))
+    return free
 
 
 @njit(cache=True)
-def _carriageway(
-    u: NDArray[np.float64], v: NDArray[np.float64], pattern: NDArray[np.float64], key: int
+def _off_road(
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+    clumped: NDArray[np.bool_],
+    pattern: NDArray[np.float64],
+    key: int,
+    zones: NDArray[np.uint8],
+    first: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Whether places lie on asphalt: the street but for its two verges."""
-    on = np.zeros(len(u), dtype=np.bool_)
+    free = np.zeros(len(u), dtype=np.bool_)
     for k in range(len(u)):
-        _, _, along, across = locate(u[k], v[k], pattern, key)
+        block, row, along, across = locate(u[k], v[k], pattern, key)
+        # The street but for its two verges.
         main = min(across, pattern[0] - across) < pattern[2] / 2 - 2.4
-        on[k] = main or min(along, pattern[1] - along) < pattern[3] / 2 - 2.0
-    return on
+        road = main or min(along, pattern[1] - along) < pattern[3] / 2 - 2.0
+        free[k] = not road and (clumped[k] or zone_of(block, row, zones, first) != FIELDS)
+    return free
 
 
 def _distance_to_buildings(

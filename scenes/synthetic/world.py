@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ..raster import Elevation
 from .buildings import build
 from .clutter import patch_table, scatter
-from .layout import Layout, plan_layout, plan_sites
+from .layout import Layout, plan_layout
+from .parcels import plan_sites
 from .recipe import SceneParameters
 from .solids import Body, Solids
 from .terrain import natural_terrain, terraced

@@ -121,6 +121,33 @@ def test_only_what_is_needed_is_loaded(files):
     assert run.stderr.strip().splitlines()[-1] == "[]"
 
 
+def test_a_scene_folder_brings_reference_area_and_grid(files):
+    scene = rb.Scene(
+        "small",
+        (-10, -10, 90, 30),
+        crs="EPSG:25832",
+        reference=rb.Footprints.of(HOUSES, crs="EPSG:25832"),
+        area=shapely.box(-5, -5, 35, 25),
+    )
+    rb.save_scene(scene, files / "small")
+    result = json.loads(roofbench("evaluate", "d.geojson", "small/", "-f", "json", folder=files).stdout)
+    assert result["counts"]["reference"] == 2
+    assert result["left_out"]["reference_outside"] == 2
+
+
+def test_houses_of_a_row_are_joined_to_blocks_on_request(files):
+    row = [shapely.box(6 * k, 0, 6 * k + 5.95, 9) for k in range(5)]
+    rb.write_footprints(rb.Footprints.of(row, crs="EPSG:25832"), files / "row.gpkg")
+    rb.write_footprints(rb.Footprints.of([shapely.box(0, 0, 29.95, 9)], crs="EPSG:25832"), files / "block.gpkg")
+    houses = json.loads(roofbench("evaluate", "block.gpkg", "row.gpkg", "-f", "json", folder=files).stdout)
+    blocks = json.loads(
+        roofbench("evaluate", "block.gpkg", "row.gpkg", "-f", "json", "--join-gaps", 0.1, folder=files).stdout
+    )
+    assert houses["object"]["quality"] == pytest.approx(0.2)
+    assert blocks["object"]["quality"] == 1
+    assert blocks["pixel"]["quality"] == pytest.approx(1)
+
+
 BAD_INPUT = {
     "missing file": (["x.gpkg", "r.gpkg"], "x.gpkg: no such file"),
     "no vector file": (["noise.gpkg", "r.gpkg"], "noise.gpkg cannot be read as a vector file"),
@@ -140,6 +167,8 @@ BAD_INPUT = {
     "negative size": (["d.geojson", "r.gpkg", "--area", "pixels", "--gsd", "-1"], "gsd must be at least"),
     "unknown evaluator": (["d.geojson", "r.gpkg", "-e", "treshold-free"], "did you mean 'threshold-free'"),
     "unknown parameter": (["d.geojson", "r.gpkg", "-e", "threshold-free[maching=overlap]"], "did you mean 'matching'"),
+    "no gap to join": (["d.geojson", "r.gpkg", "--join-gaps", "0"], "more than 0 m"),
+    "a folder that is no scene": (["d.geojson", "."], "scene.toml"),
     "area without polygons": (["d.geojson", "r.gpkg", "--evaluation-area", "points.gpkg"], "no polygons"),
 }
 

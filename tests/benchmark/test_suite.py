@@ -67,15 +67,18 @@ def test_a_mistake_is_named_with_its_line(suite_file, before, after, message):
         read_suite(suite_file(GOOD.replace(before, after)))
 
 
-def test_a_list_is_a_sweep_axis(suite_file, monkeypatch):
-    suite = read_suite(suite_file(GOOD.replace("seeds = [4, 7]", "seeds = 2\nslope = [0, 5]")))
+def test_a_list_is_a_sweep_axis(suite_file):
+    varied = GOOD.replace('"hamlet"', '"knox-small"').replace("seeds = [4, 7]", "seeds = 2\nslope = [0, 5]")
+    suite = read_suite(suite_file(varied))
     assert [scene.name for scene in suite.scenes] == [
-        "hamlet-1[slope=0]",
-        "hamlet-2[slope=0]",
-        "hamlet-1[slope=5]",
-        "hamlet-2[slope=5]",
+        "knox-small-1[slope=0]",
+        "knox-small-2[slope=0]",
+        "knox-small-1[slope=5]",
+        "knox-small-2[slope=5]",
     ]
-    assert {scene.group for scene in suite.scenes} == {"hamlet[slope=0]", "hamlet[slope=5]"}
+    assert {scene.group for scene in suite.scenes} == {"knox-small[slope=0]", "knox-small[slope=5]"}
+    with pytest.raises(RoofbenchError, match=r"line 6: .*slpe.* in \[\[scenes\]\] number 1"):
+        read_suite(suite_file(varied.replace("slope", "slpe")))
 
 
 def test_words_name_scenes():

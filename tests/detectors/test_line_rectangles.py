@@ -94,7 +94,7 @@ def test_the_longest_line_makes_the_rectangle_and_the_others_are_inside_it():
     black[20:80, 30:170] = 1
     lines = np.array([line(100, 20, 0, 130), line(100, 80, 180, 120), line(170, 50, 90, 50), line(100, 10, 180, 30)])
     order = np.arange(4)
-    found, fate = initial_rectangles(cover(black), RULES, lines, order, 10.0, 20.0, 3.0)
+    found, fate = initial_rectangles(cover(black), RULES, lines, order, 10.0, 20.0, 3.0, 0.75)
     assert len(found) == 1
     assert fate.tolist() == [0, INSIDE, INSIDE, TOO_NARROW]
 

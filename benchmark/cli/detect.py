@@ -1,0 +1,130 @@
+"""Commands on one detector: ``roofbench detect`` and ``check-plugin``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...scenes.errors import ParameterError
+from .options import PluginOption, QuietOption, load_plugins
+
+if TYPE_CHECKING:
+    from ...detectors.base import Detector
+    from ...evaluators.base import Evaluator
+    from ...scenes.scene import Scene
+
+
+def detect(
+    detector: Annotated[str, typer.Argument(help="NAME, 'NAME[parameter=value,...]' or FILE.py:CLASS.")],
+    scene: Annotated[str, typer.Argument(help="Scene folder, or preset such as 'knox-small[seed=3]'.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Vector file for the footprints.")] = None,
+    parameter: Annotated[
+        list[str] | None, typer.Option("--parameter", "-p", help="NAME=VALUE; repeat for more.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random stream of a stochastic detector.")] = 0,
+    steps: Annotated[Path | None, typer.Option(help="Folder for a picture of every intermediate step.")] = None,
+    plugin: PluginOption = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what exists.")] = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Detect buildings on one scene and write their footprints."""
+    import time
+
+    from ...detectors.registry import make_detector
+    from ...scenes.output import check_target
+    from ...scenes.vector_files import write_footprints
+    from ..suite import scenes_of
+    from ..worker import detect as run_detector
+
+    load_plugins(plugin)
+    if output is None and steps is None:
+        raise ParameterError("name what to write: --output FILE for footprints, --steps FOLDER for pictures")
+    values = {}
+    for item in parameter or ():
+        name, equals, value = item.partition("=")
+        if not equals:
+            raise ParameterError(f"cannot read --parameter {item!r}: write NAME=VALUE")
+        values[name.strip()] = value.strip()
+    chosen = make_detector(detector, values)
+    for target in (output, steps):
+        if target is not None:
+            check_target(target, overwrite)
+    (recipe,) = scenes_of([scene])
+    place = recipe.open()
+    if output is not None:
+        started = time.process_time()
+        found = run_detector(place, chosen, seed=seed)
+        seconds = time.process_time() - started
+        write_footprints(found, output, overwrite=overwrite)
+        if not quiet:
+            typer.echo(f"{output}: {len(found)} footprints on {place.name} in {seconds:.2f} CPU seconds", err=True)
+    if steps is not None:
+        count = _write_steps(chosen, place, seed, steps, overwrite)
+        if not quiet:
+            typer.echo(f"{steps}: {count} pictures", err=True)
+
+
+def _write_steps(detector: Detector, scene: Scene, seed: int, folder: Path, overwrite: bool) -> int:
+    from matplotlib.figure import Figure
+
+    from ...reports.figures import save_figure
+    from ...scenes.output import whole_folder
+    from ..worker import random_stream
+
+    captions = []
+    with whole_folder(folder, overwrite=overwrite) as scratch:
+        visible = scene.for_detection()
+        visible.require(detector.requires)
+        for step in detector.steps(visible, random_stream(seed, scene, detector)):
+            figure = Figure(figsize=(8, 8), layout="constrained")
+            step.draw(figure)
+            save_figure(figure, scratch / f"{step.name}.png")
+            captions.append(f"- `{step.name}.png`: {step.caption}\n")
+        (scratch / "README.md").write_text(f"# {detector.name} on {scene.name}\n\n" + "".join(captions), "utf-8")
+    return len(captions)
+
+
+def check_plugin(
+    name: Annotated[str, typer.Argument(help="Detector or evaluator: NAME or FILE.py:CLASS.")],
+    plugin: PluginOption = None,
+) -> None:
+    """Check that a detector or evaluator keeps to the rules, on a small built-in scene; exit code 3 when not."""
+    from ...detectors.registry import DETECTORS, make_detector
+    from ...evaluators.registry import EVALUATORS, make_evaluator
+    from ...scenes.errors import UnknownNameError
+    from ...scenes.names import nearest_hint, parse_selection
+    from .. import conformance
+
+    load_plugins(plugin)
+    known = [*DETECTORS.names(), *EVALUATORS.names()]
+    word = parse_selection(name)[0]
+    if ".py" in word:
+        checks = conformance.check_plugin(_from_file(name))
+    elif word in DETECTORS.names():
+        checks = conformance.check_detector(make_detector(name))
+    elif word in EVALUATORS.names():
+        checks = conformance.check_evaluator(make_evaluator(name))
+    else:
+        raise UnknownNameError(f"no plugin called {word!r}{nearest_hint(word, known)}; there are {', '.join(known)}")
+    for check in checks:
+        typer.echo(
+            f"{'ok    ' if check.passed else 'BROKEN'}  {check.rule}{': ' + check.problem if check.problem else ''}"
+        )
+    broken = sum(not check.passed for check in checks)
+    typer.echo(f"{name}: {len(checks) - broken} of {len(checks)} rules kept")
+    if broken:
+        raise typer.Exit(3)
+
+
+def _from_file(selection: str) -> Detector | Evaluator:
+    """Return the detector or the evaluator that ``file.py:Class`` names, whichever it is."""
+    from ...detectors.registry import make_detector
+    from ...evaluators.registry import make_evaluator
+    from ...scenes.errors import RoofbenchError
+
+    try:
+        return make_detector(selection)
+    except RoofbenchError:
+        return make_evaluator(selection)

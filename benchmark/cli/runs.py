@@ -1,0 +1,154 @@
+"""Commands on stored runs: ``roofbench ls``, ``why``, ``score`` and ``export``."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from .options import DEFAULT_STORE, PluginOption, StoreOption, load_plugins, table_console
+
+_COLUMNS = ("id", "key", "status", "label", "scene", "seed", "detected", "seconds", "cpu_seconds", "peak_memory")
+
+
+def ls(
+    status: Annotated[Literal["ok", "failed", "skipped"] | None, typer.Option(help="Only runs of this status.")] = None,
+    detector: Annotated[
+        str | None, typer.Option("--detector", "-d", help="Only matching labels.", metavar="PATTERN")
+    ] = None,
+    scene: Annotated[str | None, typer.Option("--scene", help="Only matching scenes.", metavar="PATTERN")] = None,
+    limit: Annotated[int, typer.Option("--limit", "-n", min=0, help="At most so many, the newest first; 0: all.")] = 50,
+    form: Annotated[
+        Literal["table", "csv", "json"], typer.Option("--format", "-f", help="How they are printed.")
+    ] = "table",
+    store: StoreOption = DEFAULT_STORE,
+) -> None:
+    """List stored runs."""
+    from ..store import Store
+
+    with Store(store, must_exist=True) as opened:
+        rows = opened.runs(status=status, detector=detector, scene=scene, limit=limit or None)
+        total = opened.count_runs() if form == "table" else 0
+    if form == "json":
+        plain = [{name: value for name, value in asdict(row).items() if not name.endswith("_text")} for row in rows]
+        typer.echo(json.dumps(plain, indent=2))
+        return
+    if form == "csv":
+        writer = csv.writer(sys.stdout, lineterminator="\n")
+        writer.writerow([*_COLUMNS, "version", "finished", "reason"])
+        columns = (*_COLUMNS, "version", "finished", "reason")
+        writer.writerows([getattr(row, name) for name in columns] for row in rows)
+        return
+    width = max([len(row.label) for row in rows] + [len("detector")])
+    place = max([len(row.scene) for row in rows] + [len("scene")])
+    lines = [
+        f"{'run':>6}  {'key':8}  {'status':7}  {'detector':{width}}  {'scene':{place}}  {'seed':>4}  {'found':>6}  "
+        f"{'seconds':>8}  {'CPU s':>8}  {'MB':>6}  reason"
+    ]
+    for row in rows:
+        found = "" if row.detected is None else str(row.detected)
+        cost = f"{row.seconds:>8.2f}  {row.cpu_seconds:>8.2f}  {row.peak_memory / 1e6:>6.0f}"
+        line = f"{row.id:>6}  {row.key[:8]}  {row.status:7}  {row.label:{width}}  {row.scene:{place}}  {row.seed:>4}  "
+        lines.append(f"{line}{found:>6}  {cost}  {row.reason}".rstrip())
+    lines.append(f"{len(rows)} of {total} runs in {store}")
+    typer.echo("\n".join(lines))
+
+
+def why(
+    run: Annotated[str, typer.Argument(help="Number of the run, or the first digits of its key.")],
+    store: StoreOption = DEFAULT_STORE,
+    plugin: PluginOption = None,
+) -> None:
+    """Say what a stored run depends on, and what of it has changed since."""
+    from ...scenes.errors import RoofbenchError
+    from ..leaderboard import repeat_command
+    from ..plan import differences, identity_now
+    from ..store import Store
+
+    load_plugins(plugin)
+    with Store(store, must_exist=True) as opened:
+        row = opened.run(run)
+        code, machine = opened.code(row.id), opened.machine(row.id)
+        lines = [
+            f"run {row.id}, key {row.key}",
+            f"  status     {row.status}{': ' + row.reason if row.reason else ''}",
+            f"  detector   {row.detector}  {json.dumps(row.parameters)}",
+            f"  scene      {row.scene}, key {row.scene_key[:16]}",
+            f"  seed       {row.seed}",
+            f"  code       roofbench {row.version}, {len(code.modules)} modules, digest {code.digest[:16]}",
+            f"  packages   {', '.join(f'{name} {version}' for name, version in code.packages.items())}",
+            f"  cost       {row.seconds:.3f} s, CPU {row.cpu_seconds:.3f} s, {row.peak_memory / 1e6:.0f} MB",
+            f"  machine    {', '.join(f'{name} {value}' for name, value in machine.items()) or 'not known'}",
+            f"  finished   {row.finished}",
+            f"  repeat     {repeat_command(row)}",
+        ]
+        try:
+            changes = differences(opened, row.id, identity_now(row))
+        except RoofbenchError as error:
+            lines.append(f"It cannot be made again here: {error}")
+        else:
+            lines.append(
+                "Nothing that it depends on has changed: it would not be run again."
+                if not changes
+                else "It would be run again: " + "; ".join(changes) + "."
+            )
+            if row.status == "failed" and not changes:
+                lines[-1] = "Nothing that it depends on has changed; failures are tried again."
+        if row.traceback:
+            lines += ["", row.traceback.rstrip()]
+    typer.echo("\n".join(lines))
+
+
+def score(
+    evaluator: Annotated[list[str], typer.Option("--evaluator", "-e", help="NAME or 'NAME[parameter=value,...]'.")],
+    detector: Annotated[
+        str | None, typer.Option("--detector", "-d", help="Only matching labels.", metavar="PATTERN")
+    ] = None,
+    scene: Annotated[str | None, typer.Option("--scene", help="Only matching scenes.", metavar="PATTERN")] = None,
+    rank_by: Annotated[str | None, typer.Option(help="Index that ranks, for instance pixel.quality.")] = None,
+    store: StoreOption = DEFAULT_STORE,
+    plugin: PluginOption = None,
+) -> None:
+    """Judge stored detections by further evaluators and print their leaderboards; nothing is detected again."""
+    from ...evaluators.registry import make_evaluator
+    from ..leaderboard import make_leaderboard
+    from ..plan import Judge
+    from ..runner import score_stored
+    from ..store import Store
+
+    load_plugins(plugin)
+    judges = tuple(Judge.of(make_evaluator(name)) for name in evaluator)
+    with Store(store, must_exist=True) as opened:
+        rows = opened.runs(detector=detector, scene=scene)[::-1]
+        good = [row.id for row in rows if row.status == "ok"]
+        for judge in judges:
+            known = opened.evaluated(good, judge.key)
+            for run_id in good:
+                if run_id not in known:
+                    score_stored(opened, run_id, (judge,))
+        for judge in judges:
+            board = make_leaderboard(rows, opened, judge, title=f"Stored runs of {store}", rank_by=rank_by)
+            board.print(table_console())
+    if not good:
+        raise typer.Exit(4)
+
+
+def export(
+    run: Annotated[str, typer.Argument(help="Number of the run, or the first digits of its key.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Vector file; a GeoPackage holds both layers.")],
+    evaluator: Annotated[str | None, typer.Option("--evaluator", "-e", help="Whose verdicts.")] = None,
+    store: StoreOption = DEFAULT_STORE,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")] = False,
+) -> None:
+    """Write a stored run as vector layers: detections and references with their verdicts."""
+    from ..store import Store
+    from ..stored_verdicts import export_run
+
+    with Store(store, must_exist=True) as opened:
+        what = export_run(opened, opened.run(run).id, output, evaluator=evaluator, overwrite=overwrite)
+    typer.echo(f"{output}: {what}", err=True)

@@ -1,0 +1,220 @@
+"""Conformance: what every detector and evaluator must keep to, checked on the built-in scene.
+
+``roofbench check-plugin NAME`` runs these checks on a plugin before it meets real scenes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ..detectors.base import Detector
+from ..evaluators.base import Evaluation, Evaluator
+from ..scenes.builtin import hamlet
+from ..scenes.errors import RoofbenchError, UnsupportedError
+from ..scenes.footprints import Footprints
+from ..scenes.parameters import Parameterised
+from ..scenes.scene import Scene
+from .isolation import IsolatedProcess, Limits
+from .recipes import PluginRecipe, SceneRecipe
+from .tasks import Outcome, Task
+from .worker import detect
+
+__all__ = ["Check", "check_detector", "check_evaluator"]
+
+_SECONDS = 300.0
+
+
+@dataclass(frozen=True)
+class Check:
+    """One rule and what came of it: `problem` is empty when it is kept."""
+
+    rule: str
+    problem: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether the rule is kept."""
+        return not self.problem
+
+
+def check_detector(detector: Detector) -> list[Check]:
+    """Return the checks of a detector, on a small synthetic scene."""
+    scene = hamlet(1)
+    before = scene.content_hash
+    return [
+        *_declaration(detector),
+        _check("requires names inputs that scenes have", lambda: _lacks(detector, scene)),
+        _check("finds footprints that are valid and inside the scene", lambda: _found(detector, scene)),
+        _check("the same seed gives the same footprints", lambda: _repeats(detector, scene)),
+        _check("is stochastic exactly if it says so", lambda: _stochastic(detector, scene)),
+        _check("leaves the scene as it was", lambda: "" if _digest(scene) == before else "it changed the arrays"),
+        _check("a scene without buildings is no error", lambda: _found(detector, _meadow(scene))),
+        _check("works in another process, with the same result", lambda: _elsewhere(detector, scene)),
+    ]
+
+
+def check_evaluator(evaluator: Evaluator) -> list[Check]:
+    """Return the checks of an evaluator."""
+    reference = hamlet(1).reference
+    assert reference is not None
+    moved = Footprints.of(shapely.transform(reference.polygons[3:], lambda xy: xy + 1.0), crs=reference.crs)
+    empty = Footprints.empty(crs=reference.crs)
+
+    def evaluated(detected: Footprints, truth: Footprints) -> Evaluation:
+        return evaluator.evaluate(detected, truth)
+
+    return [
+        *_declaration(evaluator),
+        _check("reports every index that it declares, and no other", lambda: _indices(evaluated(moved, reference))),
+        _check("values lie in the declared range", lambda: _range(evaluated(moved, reference))),
+        _check("a perfect result and empty sets are no errors", lambda: _edges(evaluated, reference, empty)),
+        _check("indices follow from tallies and samples", lambda: _summary(evaluated(moved, reference))),
+        _check("order of the objects does not matter", lambda: _order(evaluated, moved, reference)),
+        _check("pooling one evaluation changes nothing", lambda: _pooling(evaluated(moved, reference))),
+        _check("the result is JSON", lambda: _json(evaluated(moved, reference))),
+    ]
+
+
+def _check(rule: str, problem: Callable[[], str]) -> Check:
+    try:
+        return Check(rule, problem())
+    except RoofbenchError as error:
+        return Check(rule, str(error))
+    except Exception as error:
+        return Check(rule, f"{type(error).__name__}: {error}")
+
+
+def _declaration(plugin: Parameterised) -> Iterator[Check]:
+    kind = type(plugin)
+    frozen = getattr(getattr(kind, "__dataclass_params__", None), "frozen", False)
+    yield Check("is a frozen dataclass", "" if frozen else "decorate it with @dataclass(frozen=True, kw_only=True)")
+    told = (kind.__doc__ or "").strip()
+    yield Check("has a docstring", "" if told and not told.startswith(kind.__name__ + "(") else "say what it does")
+    silent = [name for name, rule in kind.parameters().items() if not rule.doc]
+    yield Check("documents its parameters", f"no doc= for {', '.join(silent)}" if silent else "")
+
+
+def _lacks(detector: Detector, scene: Scene) -> str:
+    return scene.for_detection().lacks(detector.requires) or ""
+
+
+def _found(detector: Detector, scene: Scene) -> str:
+    detect(scene, detector)
+    return ""
+
+
+def _same(one: Footprints, two: Footprints) -> bool:
+    return bool(np.array_equal(shapely.to_wkb(one.polygons), shapely.to_wkb(two.polygons)))
+
+
+def _repeats(detector: Detector, scene: Scene) -> str:
+    return "" if _same(detect(scene, detector), detect(scene, detector)) else "draw random numbers from rng only"
+
+
+def _stochastic(detector: Detector, scene: Scene) -> str:
+    differ = not _same(detect(scene, detector, seed=0), detect(scene, detector, seed=1))
+    if differ and not detector.stochastic:
+        return "another seed gives other footprints: set stochastic = True"
+    if detector.stochastic and not differ:
+        return "another seed gives the same footprints: set stochastic = False"
+    return ""
+
+
+def _digest(scene: Scene) -> str:
+    fresh = Scene(
+        scene.name,
+        scene.extent,
+        crs=scene.crs,
+        points=scene.points,
+        image=scene.image,
+        dem=scene.dem,
+        reference=scene.reference,
+    )
+    return fresh.content_hash
+
+
+def _meadow(scene: Scene) -> Scene:
+    """Return the scene with only the points near the ground, and a grey image."""
+    cloud, dem, image = scene.points, scene.dem, scene.image
+    assert cloud is not None
+    assert dem is not None
+    assert image is not None
+    low = cloud.z - dem.sample(cloud.x, cloud.y) < 0.3
+    grey = type(image)(np.full_like(image.values, 120), image.bands, image.grid)
+    return Scene("meadow", scene.extent, crs=scene.crs, points=cloud.take(low), image=grey, dem=dem)
+
+
+def _elsewhere(detector: Detector, scene: Scene) -> str:
+    recipe = PluginRecipe.of(detector)
+    task = Task(scene=SceneRecipe.of_preset("hamlet", seed=1), detector=recipe, seed=0, evaluators=())
+    process = IsolatedProcess()
+    try:
+        outcome = Outcome.from_bytes(process.call(task.to_json(), Limits(_SECONDS)))
+    finally:
+        process.close()
+    if outcome.status != "ok":
+        return outcome.reason
+    same = list(outcome.detections) == shapely.to_wkb(detect(scene, detector).polygons).tolist()
+    return "" if same else "the footprints differ: something depends on threads or on the state of the process"
+
+
+def _indices(evaluation: Evaluation) -> str:
+    declared = {index.key for index in evaluation.evaluator.indices}
+    differing = declared ^ set(evaluation.values)
+    return f"differing: {', '.join(sorted(differing))}" if differing else ""
+
+
+def _range(evaluation: Evaluation) -> str:
+    for index in evaluation.evaluator.indices:
+        value = evaluation.values[index.key]
+        if value is not None and not index.range[0] - 1e-9 <= value <= index.range[1] + 1e-9:
+            return f"{index.key} is {value}, declared from {index.range[0]} to {index.range[1]}"
+    return ""
+
+
+def _edges(evaluated: Callable[..., Evaluation], reference: Footprints, empty: Footprints) -> str:
+    for one, two in ((reference, reference), (empty, reference), (reference, empty), (empty, empty)):
+        evaluated(one, two)
+    return ""
+
+
+def _summary(evaluation: Evaluation) -> str:
+    rebuilt = evaluation.evaluator.summarise(evaluation.tallies, evaluation.samples)
+    return "" if dict(rebuilt.values) == dict(evaluation.values) else "summarise gives other values than evaluate"
+
+
+def _order(evaluated: Callable[..., Evaluation], detected: Footprints, reference: Footprints) -> str:
+    straight = evaluated(detected, reference).values
+    turned = evaluated(
+        detected.take(np.arange(len(detected))[::-1]), reference.take(np.arange(len(reference))[::-1])
+    ).values
+    for key, value in straight.items():
+        other = turned[key]
+        same = value == other or (value is not None and other is not None and abs(value - other) < 1e-9 * abs(value))
+        if not same:
+            return f"{key} is {value} and, with the objects reversed, {other}"
+    return ""
+
+
+def _pooling(evaluation: Evaluation) -> str:
+    pooled = evaluation.evaluator.pool([evaluation])
+    return "" if dict(pooled.values) == dict(evaluation.values) else "pooled values differ"
+
+
+def _json(evaluation: Evaluation) -> str:
+    json.dumps(evaluation.to_dict(), allow_nan=False)
+    return ""
+
+
+def check_plugin(plugin: Detector | Evaluator) -> list[Check]:
+    """Return the checks of either kind."""
+    if isinstance(plugin, Detector):
+        return check_detector(plugin)
+    if isinstance(plugin, Evaluator):
+        return check_evaluator(plugin)
+    raise UnsupportedError(f"{plugin!r} is neither a detector nor an evaluator")

@@ -1,0 +1,222 @@
+"""What is no building: how likely a cell's height and texture are on the ground, in a crown and on a roof.
+
+Nouns
+-----
+window
+    3 x 3 cells, all of them high.
+roughness
+    Root mean square distance of a window's heights from their best plane, metres.
+openness
+    Mean share of points that a closed surface would not give (see `cells`), of a window.
+evidence
+    log p(texture | roof) - log p(texture | crown), nats; of a cell, that of the best window that holds it, so that
+    cells at the edge of a roof are judged by the roof and not by the edge.
+score
+    What a cell adds to a rectangle besides the fit of its roof: for a high cell, evidence - log p(height | crown); for
+    a low and for a void cell a fixed price.
+
+Texture of the two classes is estimated from the scene by EM (expectation maximisation) on a histogram of windows, and
+held near what roofs and crowns are by pseudo-counts, so that a scene of roofs alone or of crowns alone keeps two
+classes. The crowns' heights are Gaussian as in Yu, Li, Guan & Wang (2013), equation 1, with a floor for outliers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .cells import HIGH, LOW, Cells
+
+__all__ = ["Background", "estimate_background", "score_cells"]
+
+#: Bins of the histogram: log roughness from 1 cm to 4 m, openness from 0 to 1.
+_ROUGH_BINS, _OPEN_BINS = 24, 8
+_LOG_LOW, _LOG_HIGH = math.log(0.01), math.log(4.0)
+#: What roofs and crowns are like before a scene is seen: median roughness (m), spread of its logarithm, openness.
+_ROOF_ROUGH, _CROWN_ROUGH = (0.08, 0.75), (0.55, 0.55)
+_ROOF_OPEN = (0.70, 0.12, 0.07, 0.04, 0.03, 0.02, 0.01, 0.01)
+_CROWN_OPEN = (0.22, 0.10, 0.10, 0.10, 0.10, 0.12, 0.12, 0.14)
+#: log p(height | crown) is not less than this, so that a bird or a tower is no proof of anything.
+_HEIGHT_FLOOR = -5.0
+#: A high cell that no window holds (a pole, a wall, the rim of a crown) has this evidence.
+_THIN = -1.0
+
+
+@dataclass(frozen=True)
+class Background:
+    """The estimated classes.
+
+    Attributes
+    ----------
+    crown_height, crown_spread : float
+        Mean and standard deviation of heights in crowns, metres.
+    crown_share : float
+        Share of windows in crowns.
+    roof_roughness, crown_roughness : float
+        Median roughness, metres.
+    evidence : tuple of tuple of float
+        Nats per bin of log roughness and of openness, (24, 8).
+    windows : int
+        How many windows it was estimated from.
+    """
+
+    crown_height: float
+    crown_spread: float
+    crown_share: float
+    roof_roughness: float
+    crown_roughness: float
+    evidence: tuple[tuple[float, ...], ...]
+    windows: int
+
+
+@njit(cache=True, nogil=True)
+def _window_bins(height, state, openness):  # type: ignore[no-untyped-def]
+    """Return the bin of each window at its centre cell, -1 where there is none: shape (rows, columns), int16."""
+    rows, columns = state.shape
+    bins = np.full((rows, columns), -1, dtype=np.int16)
+    for r in range(1, rows - 1):
+        for c in range(1, columns - 1):
+            if state[r, c] != HIGH:
+                continue
+            total, squares, east, south, openly = 0, 0, 0, 0, 0
+            whole = True
+            for i in range(-1, 2):
+                for j in range(-1, 2):
+                    if state[r + i, c + j] != HIGH:
+                        whole = False
+                    h = height[r + i, c + j] - height[r, c]
+                    total += h
+                    squares += h * h
+                    east += j * h
+                    south += i * h
+                    openly += openness[r + i, c + j]
+            if not whole:
+                continue
+            residual = squares - total * total / 9.0 - (east * east + south * south) / 6.0
+            rough = 0.01 * math.sqrt(max(residual, 0.0) / 6.0)
+            share = (math.log(max(rough, 0.01)) - _LOG_LOW) / (_LOG_HIGH - _LOG_LOW)
+            a = min(int(share * _ROUGH_BINS), _ROUGH_BINS - 1)
+            b = min(int(openly / 9.0 / 255.0 * _OPEN_BINS), _OPEN_BINS - 1)
+            bins[r, c] = a * _OPEN_BINS + b
+    return bins
+
+
+def estimate_background(cells: Cells) -> tuple[Background, NDArray[np.int16]]:
+    """Estimate the classes of a scene; also return the bin of each window at its centre cell (-1: no window)."""
+    bins = _window_bins(cells.height, cells.state, cells.openness)
+    held = bins >= 0
+    counts = np.bincount(bins[held], minlength=_ROUGH_BINS * _OPEN_BINS).astype(np.float64)
+    counts = counts.reshape(_ROUGH_BINS, _OPEN_BINS)
+    rough = _LOG_LOW + (np.arange(_ROUGH_BINS) + 0.5) * (_LOG_HIGH - _LOG_LOW) / _ROUGH_BINS
+    windows = int(counts.sum())
+    pseudo = max(200.0, 0.1 * windows)
+    means = [math.log(_ROOF_ROUGH[0]), math.log(_CROWN_ROUGH[0])]
+    spreads = [_ROOF_ROUGH[1], _CROWN_ROUGH[1]]
+    opens = [np.array(_ROOF_OPEN), np.array(_CROWN_OPEN)]
+    share = 0.5
+    belongs = np.full(counts.shape, 0.5)
+    for _ in range(20):
+        logs = [
+            -0.5 * ((rough - mean) / spread)[:, None] ** 2 - math.log(spread) + np.log(opening)[None, :]
+            for mean, spread, opening in zip(means, spreads, opens, strict=True)
+        ]
+        odds = logs[1] - logs[0] + math.log(share / (1 - share))
+        belongs = 1 / (1 + np.exp(-np.clip(odds, -50, 50)))
+        for k, weight in enumerate((counts * (1 - belongs), counts * belongs)):
+            centre, width = (_ROOF_ROUGH, _CROWN_ROUGH)[k]
+            by_rough = weight.sum(axis=1)
+            size = by_rough.sum() + pseudo
+            means[k] = float((by_rough @ rough + pseudo * math.log(centre)) / size)
+            scatter = by_rough @ (rough - means[k]) ** 2 + pseudo * (width**2 + (math.log(centre) - means[k]) ** 2)
+            spreads[k] = float(np.clip(math.sqrt(scatter / size), 0.4, 1.0))
+            opens[k] = (weight.sum(axis=0) + pseudo * np.array((_ROOF_OPEN, _CROWN_OPEN)[k])) / size
+        share = float(np.clip(((counts * belongs).sum() + 100) / (windows + 200), 0.02, 0.98))
+    logs = [
+        -0.5 * ((rough - mean) / spread)[:, None] ** 2 - math.log(spread) + np.log(opening)[None, :]
+        for mean, spread, opening in zip(means, spreads, opens, strict=True)
+    ]
+    evidence = logs[0] - logs[1]
+    # A smoother window is never less of a roof: the tail of the narrower class must not turn the ratio round.
+    evidence = np.minimum.accumulate(evidence, axis=0)
+    evidence = np.minimum.accumulate(evidence, axis=1)
+    weights = belongs.ravel()[bins[held]]
+    heights = 0.01 * cells.height[held]
+    size = weights.sum() + 100.0
+    crown_height = float((weights @ heights + 100.0 * 6.0) / size)
+    crown_spread = float(np.sqrt((weights @ (heights - crown_height) ** 2 + 100.0 * 9.0) / size))
+    background = Background(
+        crown_height=crown_height,
+        crown_spread=max(crown_spread, 2.0),
+        crown_share=share,
+        roof_roughness=math.exp(means[0]),
+        crown_roughness=math.exp(means[1]),
+        evidence=tuple(tuple(float(value) for value in row) for row in evidence),
+        windows=windows,
+    )
+    return background, bins
+
+
+def score_cells(
+    cells: Cells,
+    bins: NDArray[np.int16],
+    background: Background,
+    *,
+    fit_weight: float,
+    texture_weight: float,
+    texture_limit: float,
+    low_price: float,
+    void_price: float,
+) -> NDArray[np.float32]:
+    """Return the score of each cell in nats, shape (rows, columns).
+
+    Parameters
+    ----------
+    cells : Cells
+    bins : ndarray of int16
+        As `estimate_background` returns them.
+    background : Background
+    texture_weight, texture_limit : float
+        Factor of the evidence (neighbouring windows share cells, so they are no independent witnesses), and the
+        bound of its absolute value, nats.
+    low_price, void_price : float
+        Nats that a low and a void cell cost.
+    """
+    evidence = np.clip(texture_weight * np.array(background.evidence), -texture_limit, texture_limit).ravel()
+    return _score(  # type: ignore[no-any-return]
+        cells.height,
+        cells.state,
+        bins,
+        evidence,
+        background.crown_height,
+        background.crown_spread,
+        fit_weight,
+        texture_weight * _THIN,
+        low_price,
+        void_price,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _score(height, state, bins, evidence, mean, spread, fit_weight, thin, low_price, void_price):  # type: ignore[no-untyped-def]
+    rows, columns = state.shape
+    score = np.full((rows, columns), -void_price, dtype=np.float32)
+    level = -math.log(spread * math.sqrt(2.0 * math.pi))
+    for r in range(rows):
+        for c in range(columns):
+            if state[r, c] == LOW:
+                score[r, c] = -low_price
+            elif state[r, c] == HIGH:
+                best = -np.inf
+                for i in range(max(r - 1, 0), min(r + 2, rows)):
+                    for j in range(max(c - 1, 0), min(c + 2, columns)):
+                        if bins[i, j] >= 0:
+                            best = max(best, evidence[bins[i, j]])
+                if best == -np.inf:
+                    best = thin
+                log_crown = level - 0.5 * ((0.01 * height[r, c] - mean) / spread) ** 2
+                score[r, c] = best - fit_weight * max(log_crown, _HEIGHT_FLOOR)
+    return score

@@ -1,0 +1,186 @@
+"""Boxes that the data suggest: where the sampler tries births first. The energy decides about every one of them.
+
+Nouns
+-----
+roof cells
+    High cells whose score is positive.
+patch
+    Roof cells connected through steps no higher than a limit. Several limits are used: a low one parts houses of
+    different height, no limit keeps a block together.
+box
+    Rectangle in the grid frame. Each patch is turned to the angle at which its bounding rectangle is smallest and
+    taken apart greedily into the largest rectangles that it fills (L, T, U shapes and rows give several).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .cells import HIGH
+
+__all__ = ["label_patches", "propose_boxes"]
+
+#: Angles tried in a quarter turn.
+_ANGLES = 30
+#: Largest rectangles taken from one patch.
+_PIECES = 12
+
+
+def propose_boxes(
+    height: NDArray[np.int32],
+    state: NDArray[np.uint8],
+    score: NDArray[np.float32],
+    *,
+    steps: tuple[float, ...],
+    least_cells: int,
+) -> NDArray[np.float64]:
+    """Return boxes of the patches of several step limits, shape (n, 5), without doubles.
+
+    Parameters
+    ----------
+    height, state, score : ndarray, shape (rows, columns)
+    steps : tuple of float
+        Limits in metres.
+    least_cells : int
+        Smaller patches and pieces are left out.
+    """
+    roof = (state == HIGH) & (score > 0)
+    found = [_boxes(*label_patches(height, roof, round(100 * step)), least_cells) for step in steps]
+    boxes = np.concatenate(found) if found else np.empty((0, 5))
+    return boxes[np.sort(np.unique(np.round(boxes, 3), axis=0, return_index=True)[1])]
+
+
+@njit(cache=True, nogil=True)
+def label_patches(height, roof, step):  # type: ignore[no-untyped-def]
+    """Label roof cells (four neighbours, at most `step` centimetres apart) from 1; also return the number of labels."""
+    rows, columns = roof.shape
+    labels = np.zeros((rows, columns), dtype=np.int32)
+    stack = np.empty((rows * columns + 1, 2), dtype=np.int32)
+    count = 0
+    for r0 in range(rows):
+        for c0 in range(columns):
+            if not roof[r0, c0] or labels[r0, c0] != 0:
+                continue
+            count += 1
+            labels[r0, c0] = count
+            stack[0, 0], stack[0, 1] = r0, c0
+            size = 1
+            while size > 0:
+                size -= 1
+                r, c = stack[size, 0], stack[size, 1]
+                for side in range(4):
+                    i = r + (1 if side == 0 else (-1 if side == 1 else 0))
+                    j = c + (1 if side == 2 else (-1 if side == 3 else 0))
+                    if i < 0 or j < 0 or i >= rows or j >= columns or not roof[i, j] or labels[i, j] != 0:
+                        continue
+                    if abs(height[i, j] - height[r, c]) <= step:
+                        labels[i, j] = count
+                        stack[size, 0], stack[size, 1] = i, j
+                        size += 1
+    return labels, count
+
+
+@njit(cache=True, nogil=True)
+def _boxes(labels, count, least_cells):  # type: ignore[no-untyped-def]
+    rows, columns = labels.shape
+    sizes = np.zeros(count + 2, dtype=np.int64)
+    for r in range(rows):
+        for c in range(columns):
+            sizes[labels[r, c] + 1] += 1
+    sizes[1] = 0
+    starts = np.cumsum(sizes)
+    place = starts[:-1].copy()
+    members = np.empty((starts[-1], 2), dtype=np.int32)
+    for r in range(rows):
+        for c in range(columns):
+            label = labels[r, c]
+            if label > 0:
+                members[place[label], 0], members[place[label], 1] = r, c
+                place[label] += 1
+    boxes = np.empty((_PIECES * max(count, 1), 5))
+    n = 0
+    for label in range(1, count + 1):
+        cells = members[starts[label] : starts[label + 1]]
+        if len(cells) >= least_cells:
+            n = _take_apart(cells, least_cells, boxes, n)
+    return boxes[:n].copy()
+
+
+@njit(cache=True, nogil=True)
+def _best_angle(cells):  # type: ignore[no-untyped-def]
+    """Angle in a quarter turn at which the bounding rectangle, cells beyond the ends cut off, is smallest."""
+    best, best_angle = np.inf, 0.0
+    step = max(1, len(cells) // 1500)
+    for k in range(_ANGLES):
+        angle = 0.5 * math.pi * k / _ANGLES
+        cos, sin = math.cos(angle), math.sin(angle)
+        low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
+        for i in range(0, len(cells), step):
+            u = cells[i, 1] * cos + cells[i, 0] * sin
+            v = cells[i, 0] * cos - cells[i, 1] * sin
+            low_u, high_u = min(low_u, u), max(high_u, u)
+            low_v, high_v = min(low_v, v), max(high_v, v)
+        area = (high_u - low_u + 1.0) * (high_v - low_v + 1.0)
+        if area < best:
+            best, best_angle = area, angle
+    return best_angle
+
+
+@njit(cache=True, nogil=True)
+def _take_apart(cells, least_cells, boxes, n):  # type: ignore[no-untyped-def]
+    """Append the largest filled rectangles of a patch, one after the other, until what is left is small."""
+    angle = _best_angle(cells)
+    cos, sin = math.cos(angle), math.sin(angle)
+    low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
+    for i in range(len(cells)):
+        x, y = cells[i, 1] + 0.5, cells[i, 0] + 0.5
+        u, v = x * cos + y * sin, y * cos - x * sin
+        low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, v), max(high_v, v)
+    width, tall = int(high_u - low_u) + 3, int(high_v - low_v) + 3
+    # Cells set four places each, so that a turned grid has no holes.
+    full = np.zeros((tall, width), dtype=np.bool_)
+    for i in range(len(cells)):
+        x, y = cells[i, 1] + 0.5, cells[i, 0] + 0.5
+        u, v = x * cos + y * sin - low_u + 0.5, y * cos - x * sin - low_v + 0.5
+        full[int(v), int(u)] = True
+        full[int(v), int(u + 0.5)] = True
+        full[int(v + 0.5), int(u)] = True
+        full[int(v + 0.5), int(u + 0.5)] = True
+    for _ in range(_PIECES):
+        area, top, left, bottom, right = _largest_filled(full)
+        if area < least_cells or bottom - top < 3 or right - left < 3:
+            break
+        # Where the grid was dilated by half a cell the box is shortened again.
+        u, v = 0.5 * (left + right) + low_u - 0.75, 0.5 * (top + bottom) + low_v - 0.75
+        boxes[n, 0], boxes[n, 1] = u * cos - v * sin, u * sin + v * cos
+        boxes[n, 2], boxes[n, 3], boxes[n, 4] = right - left - 0.5, bottom - top - 0.5, angle
+        n += 1
+        full[top:bottom, left:right] = False
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _largest_filled(full):  # type: ignore[no-untyped-def]
+    """Area, top, left, bottom, right of the largest rectangle of true cells (histogram of runs, one stack per row)."""
+    rows, columns = full.shape
+    run = np.zeros(columns + 1, dtype=np.int64)
+    stack = np.empty(columns + 2, dtype=np.int64)
+    area, top, left, bottom, right = 0, 0, 0, 0, 0
+    for r in range(rows):
+        size = 0
+        for c in range(columns + 1):
+            if c < columns:
+                run[c] = run[c] + 1 if full[r, c] else 0
+            while size > 0 and run[stack[size - 1]] >= run[c]:
+                size -= 1
+                tall = run[stack[size]]
+                begin = stack[size - 1] + 1 if size > 0 else 0
+                if tall * (c - begin) > area:
+                    area, top, left, bottom, right = tall * (c - begin), r - tall + 1, begin, r + 1, c
+            stack[size] = c
+            size += 1
+    return area, top, left, bottom, right

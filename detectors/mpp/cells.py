@@ -1,0 +1,266 @@
+"""Cells: the point cloud as one small record per square of ground.
+
+Nouns
+-----
+cell
+    Square of the working grid (0.5 to 2 m); axis order (row, column), row 0 northernmost.
+height
+    Metres above ground of a point; of a cell, the mean of the points near its top in whole centimetres, so that the
+    wall below a roof's edge does not count.
+state
+    `VOID`: no point in or around the cell; `LOW`: most points below the low limit (ground, cars, hedges, and crowns
+    that most pulses pass); `HIGH`: most points above it (roofs and closed crowns).
+openness
+    Share (0 to 255 for 0 to 1) of a cell's points that a closed surface would not give: parts of a multiple return,
+    or points below the low limit in a high cell.
+
+All sums are whole numbers, so they do not depend on the order of the points nor on how the work is split.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ...scenes.points import PointCloud
+from ...scenes.raster import Elevation, Grid
+
+__all__ = ["HIGH", "LOW", "VOID", "Cells", "cell_size", "make_cells"]
+
+VOID, LOW, HIGH = np.uint8(0), np.uint8(1), np.uint8(2)
+
+#: Points higher above ground than this many metres are birds and clouds (the tallest building of 2025 has 828 m).
+_SKY = 900.0
+#: Points this many centimetres below the highest of a cell still belong to its top.
+_NEAR_TOP = 75
+#: A height that differs by more than this many centimetres from all its neighbours is a spike.
+_SPIKE = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """The cloud on the working grid.
+
+    Attributes
+    ----------
+    grid : Grid
+    height : ndarray of int32, shape (rows, columns)
+        Centimetres above ground; 0 where the cell is not high.
+    state : ndarray of uint8, shape (rows, columns)
+        `VOID`, `LOW` or `HIGH`.
+    openness : ndarray of uint8, shape (rows, columns)
+        0 to 255 for a share of 0 to 1.
+    """
+
+    grid: Grid
+    height: NDArray[np.int32]
+    state: NDArray[np.uint8]
+    openness: NDArray[np.uint8]
+
+
+def cell_size(x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequence[float]) -> float:
+    """Return the cell size in metres at which a covered cell holds one point on average: 0.5 to 2 m in steps of 0.25.
+
+    Squares of 4 m without a point do not count as covered (water, a ragged border).
+    """
+    coarse = Grid.covering(extent, 4.0)
+    covered, points = _coverage(x, y, coarse.west, coarse.north, coarse.rows, coarse.columns)
+    if points == 0:
+        return 1.0
+    spacing = math.sqrt(16.0 * covered / points)
+    return min(max(math.ceil(4 * spacing - 0.2) / 4, 0.5), 2.0)
+
+
+@njit(cache=True, nogil=True)
+def _coverage(x, y, west, north, rows, columns):  # type: ignore[no-untyped-def]
+    seen = np.zeros((rows, columns), dtype=np.bool_)
+    covered, points = 0, 0
+    for i in range(len(x)):
+        column, row = (x[i] - west) * 0.25, (north - y[i]) * 0.25
+        if 0 <= column < columns and 0 <= row < rows:
+            points += 1
+            if not seen[int(row), int(column)]:
+                seen[int(row), int(column)] = True
+                covered += 1
+    return covered, points
+
+
+def make_cells(
+    points: PointCloud,
+    ground: Elevation,
+    grid: Grid,
+    *,
+    low: float,
+    workers: Executor | None = None,
+    bands: int = 1,
+) -> Cells:
+    """Sort the points into cells.
+
+    Parameters
+    ----------
+    points : PointCloud
+        Any returns; points that are not finite, outside the grid or in the sky are passed over.
+    ground : Elevation
+        Bare earth.
+    grid : Grid
+        Working grid.
+    low : float
+        Low limit in metres above ground.
+    workers, bands
+        Threads and the number of row bands the work is split into; neither changes the result.
+    """
+    total = np.zeros(grid.shape, dtype=np.int32)
+    high = np.zeros(grid.shape, dtype=np.int32)
+    many = np.zeros(grid.shape, dtype=np.int32)
+    top = np.zeros(grid.shape, dtype=np.int32)
+    near = np.zeros(grid.shape, dtype=np.int32)
+    rise = np.zeros(grid.shape, dtype=np.int32)
+    returns = points.number_of_returns
+    if returns is None:
+        returns = np.empty(0, dtype=np.uint8)
+    elevation = np.ascontiguousarray(ground.values, dtype=np.float32)
+    place = (ground.grid.west, ground.grid.north, ground.grid.gsd)
+    frame = (grid.west, grid.north, grid.gsd)
+    lowest = math.floor(100 * low)
+
+    def work(first: int, last: int) -> None:
+        x, y, z = points.x, points.y, points.z
+        heights, index = _above_ground(x, y, z, elevation, place, frame, first, last, *grid.shape)
+        _count(heights, index, returns, lowest, total.ravel(), high.ravel(), many.ravel(), top.ravel())
+        _add_top(heights, index, top.ravel(), near.ravel(), rise.ravel())
+
+    if workers is None or bands == 1:
+        work(0, grid.rows)
+    else:
+        edges = np.linspace(0, grid.rows, bands + 1).astype(int)
+        list(workers.map(work, edges[:-1].tolist(), edges[1:].tolist()))
+    height, state, openness = _summarise(total, high, many, near, rise)
+    return Cells(grid, height, state, openness)
+
+
+@njit(cache=True, nogil=True)
+def _above_ground(x, y, z, ground, place, frame, first, last, rows, columns):  # type: ignore[no-untyped-def]
+    """Return height in centimetres and flat cell of each point; cell -1 outside rows first..last and in the sky."""
+    west, north, cell = frame
+    west_g, north_g, cell_g = place
+    rows_g, columns_g = ground.shape
+    heights = np.empty(len(x), dtype=np.int32)
+    index = np.empty(len(x), dtype=np.int32)
+    for i in range(len(x)):
+        index[i] = -1
+        row, column = (north - y[i]) / cell, (x[i] - west) / cell
+        if not (first <= row < last and 0 <= column < columns):
+            continue
+        v = min(max((north_g - y[i]) / cell_g - 0.5, 0.0), rows_g - 1.0)
+        u = min(max((x[i] - west_g) / cell_g - 0.5, 0.0), columns_g - 1.0)
+        r0, c0 = int(v), int(u)
+        r1, c1 = min(r0 + 1, rows_g - 1), min(c0 + 1, columns_g - 1)
+        down, right = v - r0, u - c0
+        upper = ground[r0, c0] + right * (ground[r0, c1] - ground[r0, c0])
+        lower = ground[r1, c0] + right * (ground[r1, c1] - ground[r1, c0])
+        h = z[i] - (upper + down * (lower - upper))
+        if h < _SKY and h > -_SKY:
+            index[i] = int(row) * columns + int(column)
+            heights[i] = math.floor(h * 100.0 + 0.5)
+    return heights, index
+
+
+@njit(cache=True, nogil=True)
+def _count(heights, index, returns, low, total, high, many, top):  # type: ignore[no-untyped-def]
+    """Count all points, high ones and parts of multiple returns per cell, and find the top."""
+    for i in range(len(index)):
+        k = index[i]
+        if k < 0:
+            continue
+        total[k] += 1
+        if heights[i] > low:
+            high[k] += 1
+            top[k] = max(top[k], heights[i])
+        if len(returns) > 0 and returns[i] > 1:
+            many[k] += 1
+
+
+@njit(cache=True, nogil=True)
+def _add_top(heights, index, top, near, rise):  # type: ignore[no-untyped-def]
+    """Sum up the points near the top of their cell."""
+    for i in range(len(index)):
+        k = index[i]
+        if k >= 0 and top[k] > 0 and heights[i] >= top[k] - _NEAR_TOP:
+            near[k] += 1
+            rise[k] += heights[i]
+
+
+@njit(cache=True, nogil=True)
+def _summarise(total, high, many, near, rise):  # type: ignore[no-untyped-def]
+    rows, columns = high.shape
+    height = np.zeros((rows, columns), dtype=np.int32)
+    state = np.zeros((rows, columns), dtype=np.uint8)
+    openness = np.zeros((rows, columns), dtype=np.uint8)
+    for r in range(rows):
+        for c in range(columns):
+            n = total[r, c]
+            if n == 0:
+                continue
+            if 2 * high[r, c] <= n:
+                state[r, c] = LOW
+                continue
+            state[r, c] = HIGH
+            height[r, c] = rise[r, c] // near[r, c]
+            openness[r, c] = (255 * max(n - high[r, c], many[r, c])) // n
+    _despike(height, state, openness)
+    for _ in range(2):
+        _fill(height, state, openness)
+    return height, state, openness
+
+
+@njit(cache=True, nogil=True)
+def _despike(height, state, openness):  # type: ignore[no-untyped-def]
+    """Empty the high cells whose height no neighbour shares to 2 m: birds, masts, chimneys, errors of the sensor."""
+    rows, columns = state.shape
+    before = state.copy()
+    for r in range(rows):
+        for c in range(columns):
+            if before[r, c] != HIGH:
+                continue
+            shared = False
+            for i in range(max(r - 1, 0), min(r + 2, rows)):
+                for j in range(max(c - 1, 0), min(c + 2, columns)):
+                    if (i != r or j != c) and before[i, j] == HIGH and abs(height[i, j] - height[r, c]) <= _SPIKE:
+                        shared = True
+            if not shared:
+                state[r, c] = VOID
+    for r in range(rows):
+        for c in range(columns):
+            if state[r, c] == VOID:
+                height[r, c], openness[r, c] = 0, 0
+
+
+@njit(cache=True, nogil=True)
+def _fill(height, state, openness):  # type: ignore[no-untyped-def]
+    """Give a void cell the majority of its neighbours when at least three of the eight are known."""
+    rows, columns = state.shape
+    before = state.copy()
+    for r in range(rows):
+        for c in range(columns):
+            if before[r, c] != VOID:
+                continue
+            known, high, rise, openly = 0, 0, 0, 0
+            for i in range(max(r - 1, 0), min(r + 2, rows)):
+                for j in range(max(c - 1, 0), min(c + 2, columns)):
+                    if before[i, j] != VOID:
+                        known += 1
+                    if before[i, j] == HIGH:
+                        high += 1
+                        rise += height[i, j]
+                        openly += openness[i, j]
+            if known >= 3:
+                state[r, c] = HIGH if 2 * high > known else LOW
+                if 2 * high > known:
+                    height[r, c] = rise // high
+                    openness[r, c] = openly // high

@@ -1,0 +1,296 @@
+"""The detector ``mpp``: a marked point process of rectangles on a point cloud.
+
+Yu, Li, Guan & Wang (2013), "A marked point process for automated building detection from lidar point-clouds", Remote
+Sensing Letters 4(11), 1127-1136. ``mode="paper"`` is the printed algorithm; ``mode="reversible"`` a valid sampler of a
+repaired model with roofs, texture and party walls (docs/mpp.md says what was changed and why).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scenes.footprints import Footprints
+from ...scenes.ground import fill_unknown, ground_surface
+from ...scenes.parameters import parameter
+from ...scenes.points import PointCloud
+from ...scenes.raster import Elevation, Grid
+from ...scenes.scene import Scene
+from ..base import Detector
+from .annealing import Annealed, Schedule, anneal
+from .background import Background, estimate_background, score_cells
+from .candidates import propose_boxes
+from .cells import HIGH, Cells, cell_size, make_cells
+from .energy import Model, own_energy
+from .moves import MOVES
+from .polish import polish
+from .random_stream import stream
+from .rectangles import to_world
+from .roofs import KINDS, fit_roof
+from .tables import Tables, make_tables
+from .tiles import Tile, tiles_of, work_off
+
+__all__ = ["MPP", "Prepared"]
+
+_Rectangles = NDArray[np.float64]
+
+#: Fewer points than this are no scene.
+_FEW = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What the sampler reads, and what the figures show of it.
+
+    Attributes
+    ----------
+    cells : Cells
+    background : Background
+    score : ndarray of float32, shape (rows, columns)
+    tables : Tables
+    model : Model
+    boxes : ndarray, shape (n, 5)
+        Best first.
+    weights : ndarray, shape (n,)
+    """
+
+    cells: Cells
+    background: Background
+    score: NDArray[np.float32]
+    tables: Tables
+    model: Model
+    boxes: _Rectangles
+    weights: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MPP(Detector):
+    """Rectangles sampled by reversible jumps (RJMCMC) from the energy of a marked point process, without any image."""
+
+    name: ClassVar[str] = "mpp"
+    requires: ClassVar[tuple[str, ...]] = ("points",)
+    stochastic: ClassVar[bool] = True
+
+    mode: str = parameter(
+        "reversible", choices=("reversible", "paper"), doc="repaired sampler, or the algorithm as printed"
+    )
+    cell: float | None = parameter(
+        None, unit="m", minimum=0.1, maximum=5, doc="cell of the working grid; by default from the point density"
+    )
+    least_height: float = parameter(
+        2.5, unit="m", minimum=0.5, doc="least mean height of a roof above ground", swept=(2.0, 2.5, 3.0)
+    )
+    least_side: float = parameter(2.0, unit="m", minimum=0.5, doc="shortest side of a building", swept=(2.0, 3.0))
+    largest_side: float = parameter(120.0, unit="m", minimum=5, doc="longest side of a building")
+    price: float = parameter(
+        20.0, minimum=0, doc="energy of a rectangle (gamma): what its evidence must exceed", swept=(10, 20, 40)
+    )
+    overlap: float = parameter(20.0, unit="1/m2", minimum=0, doc="energy of common area (omega)", swept=(5, 20, 80))
+    fit_weight: float = parameter(
+        0.3,
+        minimum=0,
+        maximum=1,
+        doc="independent height measurements per m2: neighbouring heights deviate from a roof together",
+        swept=(0.15, 0.3, 0.6, 1.0),
+    )
+    least_tau: float = parameter(
+        0.15, unit="m", minimum=0.01, doc="least standard deviation of heights around a roof", swept=(0.1, 0.15, 0.3)
+    )
+    roofs: str = parameter("all", choices=("all", "flat"), doc="plane, gable and hip roofs besides flat ones, or not")
+    roof_price: float = parameter(3.0, minimum=0, doc="energy per number that a roof has more than a flat one")
+    texture_weight: float = parameter(
+        1.0, minimum=0, doc="weight of roughness and multiple returns as evidence", swept=(0, 0.5, 1.0)
+    )
+    texture_limit: float = parameter(3.0, minimum=0, doc="bound of that evidence, nats per m2", swept=(2, 3, 4))
+    low_price: float = parameter(3.0, minimum=0, doc="nats per m2 of low ground under a roof", swept=(2, 3, 4))
+    void_price: float = parameter(0.3, minimum=0, doc="nats per m2 without points under a roof")
+    data_births: float = parameter(
+        0.9, minimum=0, maximum=0.99, doc="share of births proposed by the data; 0: uniform", swept=(0, 0.5, 0.9)
+    )
+    start: str = parameter("greedy", choices=("greedy", "empty"), doc="first state of the chain")
+    effort: float = parameter(1.0, minimum=0, doc="factor of the number of proposals", swept=(0, 0.25, 1, 4))
+    hot: float = parameter(3.0, minimum=1e-3, doc="first temperature", swept=(1, 3, 10, 30))
+    cold: float = parameter(0.1, minimum=1e-4, doc="last temperature")
+    intensity: float = parameter(
+        200.0, unit="1/km2", minimum=1e-3, doc="buildings expected before the data are seen (lambda)"
+    )
+    jump_share: float = parameter(0.3, minimum=0, maximum=0.9, doc="share of births and deaths among the moves")
+    split_share: float = parameter(0.1, minimum=0, maximum=0.5, doc="share of splits and merges among the moves")
+    tile: float = parameter(256.0, unit="m", minimum=16, doc="side of a tile, at least twice the longest side")
+    workers: int = parameter(1, minimum=1, doc="threads; they change the time, never the result")
+
+    def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
+        """Return rectangles with the attributes height, tau, slope (m, m, m/m), roof and energy, and the run record."""
+        return self._run(scene, rng)[0]
+
+    def _run(self, scene: Scene, rng: np.random.Generator) -> tuple[Footprints, Prepared | None, _Rectangles]:
+        seed = int(rng.integers(2**63))
+        seen = scene.for_detection()
+        seen.require(self.requires)
+        began = time.perf_counter()
+        points = seen.points
+        assert points is not None
+        if np.count_nonzero(np.isfinite(points.z)) < _FEW:
+            return Footprints.empty(crs=scene.crs, source=self.name), None, np.empty((0, 5))
+        with ThreadPoolExecutor(self.workers) as pool:
+            prepared = self._prepare(points, seen, pool)
+            ready = time.perf_counter()
+            rectangles, results = self._sample(prepared, seed, pool)
+        record = {
+            "mode": self.mode,
+            "seed": seed,
+            "cell": prepared.cells.grid.gsd,
+            "background": {key: value for key, value in asdict(prepared.background).items() if key != "evidence"},
+            "boxes": len(prepared.boxes),
+            "energy": {
+                "start": sum(result.start for result in results),
+                "chain": sum(result.chain for result in results),
+                "final": sum(result.final for result in results),
+            },
+            "trace": _joined_trace(results),
+            "seconds": {"preparation": ready - began, "sampling": time.perf_counter() - ready},
+        }
+        return self._footprints(prepared, rectangles, scene.crs, record), prepared, rectangles
+
+    def _prepare(self, points: PointCloud, scene: Scene, pool: ThreadPoolExecutor) -> Prepared:
+        """Turn the cloud into cells, classes, tables and boxes."""
+        if scene.dem is not None:
+            ground = Elevation(fill_unknown(scene.dem.values), scene.dem.grid)
+        else:
+            ground = ground_surface(points, scene.extent)
+        cell = self.cell or cell_size(points.x, points.y, scene.extent)
+        grid = Grid.covering(scene.extent, cell)
+        low = 0.8 * self.least_height
+        cells = make_cells(points, ground, grid, low=low, workers=pool, bands=self.workers)
+        background, bins = estimate_background(cells)
+        score = score_cells(
+            cells,
+            bins,
+            background,
+            fit_weight=self.fit_weight,
+            texture_weight=self.texture_weight,
+            texture_limit=self.texture_limit,
+            low_price=self.low_price,
+            void_price=self.void_price,
+        )
+        tables = make_tables(cells.height, cells.state == HIGH, score)
+        model = Model(
+            weight=cell * cell,
+            price=self.price,
+            overlap=self.overlap * cell * cell,
+            roof_price=self.roof_price if self.roofs == "all" else math.inf,
+            least_tau=self.least_tau,
+            least_height=self.least_height,
+            cell=cell,
+            void_price=self.void_price,
+            least_side=self.least_side / cell,
+            largest_side=self.largest_side / cell,
+            fit_weight=self.fit_weight,
+        )
+        boxes, weights = np.empty((0, 5)), np.empty(0)
+        if self.data_births > 0 or self.start == "greedy":
+            boxes = propose_boxes(
+                cells.height, cells.state, score, steps=(0.4, 1.0, 1000.0), least_cells=math.ceil(6 / cell**2)
+            )
+            energies = np.array([own_energy(tables.small, tables.large, box, model) for box in boxes])
+            order = np.argsort(energies, kind="stable")
+            boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
+        return Prepared(cells, background, score, tables, model, boxes, weights)
+
+    def _sample(self, prepared: Prepared, seed: int, pool: ThreadPoolExecutor) -> tuple[_Rectangles, list[Annealed]]:
+        """Anneal every tile, then polish the seams."""
+        grid, model, tables = prepared.cells.grid, prepared.model, prepared.tables
+        cell = grid.gsd
+        size = max(self.tile, 2.0 * self.largest_side)
+        reach = math.sqrt(2.0) * model.largest_side
+        results: dict[tuple[int, int], Annealed] = {}
+
+        def annealed(tile: Tile, own: _Rectangles, fixed: _Rectangles) -> _Rectangles:
+            inside = tile.owns(prepared.boxes)
+            x0, y0, x1, y1 = tile.window
+            area = (x1 - x0) * (y1 - y0) * cell * cell
+            proposals = max(int(self.effort * (0.2 * area + 60 * np.count_nonzero(inside))), 1)
+            result = anneal(
+                tables,
+                model,
+                tile.window,
+                prepared.boxes[inside],
+                prepared.weights[inside],
+                own,
+                fixed,
+                stream([seed, tile.column % 2**32, tile.row % 2**32]),
+                Schedule(
+                    proposals=proposals,
+                    hot=self.hot,
+                    cold=self.cold,
+                    intensity=self.intensity * 1e-6 * cell * cell,
+                    jump_share=self.jump_share,
+                    split_share=self.split_share,
+                    data_share=self.data_births,
+                    merge_reach=20.0 / cell,
+                    greedy=self.start == "greedy",
+                ),
+            )
+            results[tile.column, tile.row] = result
+            return result.rectangles
+
+        def mended(tile: Tile, own: _Rectangles, fixed: _Rectangles) -> _Rectangles:
+            boxes = prepared.boxes[tile.owns(prepared.boxes)]
+            window = np.array(tile.window)
+            best, _ = polish(tables.small, tables.large, model, window, own, fixed, boxes, len(own) + 64, 4)
+            return best  # type: ignore[no-any-return]
+
+        tiles = tiles_of(grid, size)
+        rectangles = work_off(tiles, np.empty((0, 5)), annealed, reach=reach, workers=pool)
+        if len(tiles) > 1:
+            rectangles = work_off(tiles_of(grid, size, shifted=True), rectangles, mended, reach=reach, workers=pool)
+        order = np.lexsort(rectangles.T)
+        return rectangles[order], [results[key] for key in sorted(results)]
+
+    def _footprints(
+        self, prepared: Prepared, rectangles: _Rectangles, crs: str | None, record: dict[str, Any]
+    ) -> Footprints:
+        tables, model = prepared.tables, prepared.model
+        fits = np.zeros((len(rectangles), 5))
+        energies = np.zeros(len(rectangles))
+        for i, rectangle in enumerate(rectangles):
+            price = model.roof_price / (model.weight * model.fit_weight) if model.fit_weight > 0 else math.inf
+            fit_roof(
+                tables.small, tables.large, rectangle, price, model.least_tau, model.least_height, model.cell, fits[i]
+            )
+            energies[i] = own_energy(tables.small, tables.large, rectangle, model)
+        return Footprints.from_rectangles(
+            to_world(rectangles, prepared.cells.grid),
+            crs=crs,
+            attributes={
+                "height": fits[:, 1],
+                "tau": fits[:, 2],
+                "slope": fits[:, 4],
+                "roof": np.array([KINDS[int(kind)] for kind in fits[:, 3]], dtype=str),
+                "energy": energies,
+            },
+            metadata=record,
+            source=self.name,
+        )
+
+
+def _joined_trace(results: list[Annealed]) -> dict[str, Any]:
+    """Add up the traces of all tiles row by row: each ran the same schedule on its own number of proposals."""
+    rows = min((len(result.trace) for result in results), default=0)
+    if rows == 0:
+        return {}
+    total = np.sum([result.trace[:rows] for result in results], axis=0)
+    return {
+        "proposals": total[:, 0].tolist(),
+        "temperature": results[0].trace[:rows, 1].tolist(),
+        "energy": total[:, 2].tolist(),
+        "buildings": total[:, 3].tolist(),
+        "tried": {move: total[:, 4 + k].tolist() for k, move in enumerate(MOVES)},
+        "accepted": {move: total[:, 12 + k].tolist() for k, move in enumerate(MOVES)},
+    }

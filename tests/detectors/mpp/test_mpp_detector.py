@@ -1,0 +1,139 @@
+"""The detector as a whole: same seed, same rectangles; nothing where nothing is; odd clouds do no harm."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from roofbench.detectors.mpp.tiles import tiles_of
+from roofbench.detectors.registry import make_detector
+from roofbench.scenes.points import PointCloud
+from roofbench.scenes.raster import Elevation, Grid
+from roofbench.scenes.scene import Scene
+
+EXTENT = (1000.0, 2000.0, 1120.0, 2090.0)
+#: Roofs: x0, y0, x1, y1, eaves, and rise of a gable along x to its ridge.
+ROOFS = ((1010, 2010, 1022, 2018, 4.0, 2.0), (1022, 2010, 1030, 2018, 6.5, 0.0), (1050, 2040, 1080, 2060, 8.0, 0.0))
+
+
+def cloud(seed=0, *, density=6.0, roofs=ROOFS, trees=((1100.0, 2070.0, 5.0),)):
+    """Points over sloping ground, gables and flats, and trees whose pulses return several times."""
+    rng = np.random.default_rng(seed)
+    n = int(density * 120 * 90)
+    x, y = rng.uniform(1000, 1120, n), rng.uniform(2000, 2090, n)
+    ground = 3.0 + 0.02 * (x - 1000)
+    h = rng.normal(0, 0.05, n)
+    returns = np.ones(n, np.uint8)
+    for x0, y0, x1, y1, eaves, rise in roofs:
+        on = (x >= x0) & (x < x1) & (y >= y0) & (y < y1)
+        h[on] += eaves + rise * (1 - np.abs(y[on] - (y0 + y1) / 2) * 2 / (y1 - y0))
+    for cx, cy, radius in trees:
+        on = (x - cx) ** 2 + (y - cy) ** 2 < radius**2
+        h[on] = rng.uniform(0, 1, on.sum()) ** 0.5 * (4 + 5 * (1 - ((x[on] - cx) ** 2 + (y[on] - cy) ** 2) / radius**2))
+        returns[on] = rng.integers(1, 4, on.sum())
+    return PointCloud(x, y, ground + h, return_number=np.minimum(returns, 1), number_of_returns=returns)
+
+
+def scene(points, extent=EXTENT):
+    grid = Grid.covering(extent, 2.0)
+    x, _ = grid.to_world(*np.meshgrid(np.arange(grid.rows) + 0.5, np.arange(grid.columns) + 0.5, indexing="ij"))
+    dem = Elevation((3.0 + 0.02 * (x - 1000)).astype(np.float32), grid)
+    return Scene("made", extent, crs="EPSG:25832", points=points, dem=dem)
+
+
+def detect(points, selection="mpp", seed=0):
+    return make_detector(selection).detect(scene(points), np.random.default_rng(seed))
+
+
+def wkb(footprints):
+    return sorted(shapely.to_wkb(footprints.polygons).tolist())
+
+
+def test_houses_are_found_with_party_wall_and_roof_and_trees_are_not():
+    found = detect(cloud())
+    assert len(found) == 3
+    for x0, y0, x1, y1, _, rise in ROOFS:
+        truth = shapely.box(x0, y0, x1, y1)
+        shares = shapely.area(shapely.intersection(found.polygons, truth)) / shapely.area(
+            shapely.union(found.polygons, truth)
+        )
+        best = int(np.argmax(shares))
+        assert shares[best] > 0.85
+        assert found.attributes["roof"][best] == ("gable" if rise else "flat")
+    assert found.crs == "EPSG:25832"
+
+
+def test_the_record_holds_the_convergence_as_json():
+    record = detect(cloud()).metadata
+    assert json.loads(json.dumps(record)) == record
+    trace = record["trace"]
+    assert len(trace["energy"]) == len(trace["temperature"]) == len(trace["buildings"]) == len(trace["tried"]["birth"])
+    assert trace["temperature"][0] > trace["temperature"][-1]
+    assert record["energy"]["final"] <= record["energy"]["start"]
+
+
+def test_same_seed_same_bits_with_any_number_of_workers_and_tiles_worked_off_in_any_order():
+    points = cloud(1)
+    small = "mpp[tile=40,largest_side=20,workers={}]"
+    one = detect(points, small.format(1))
+    assert len(one) >= 3
+    assert wkb(one) == wkb(detect(points, small.format(2))) == wkb(detect(points, small.format(3)))
+
+
+def test_order_of_points_does_not_matter():
+    points = cloud(2)
+    order = np.random.default_rng(0).permutation(len(points))
+    assert wkb(detect(points)) == wkb(detect(points.take(order)))
+
+
+def test_a_large_scene_in_tiles_finds_what_one_tile_finds():
+    points = cloud(3)
+    whole, tiled = detect(points), detect(points, "mpp[tile=40,largest_side=40]")
+    assert len(tiles_of(Grid.covering(EXTENT, 0.5), 80.0)) > 1
+    assert len(whole) == len(tiled)
+    shared = shapely.area(shapely.intersection(shapely.union_all(whole.polygons), shapely.union_all(tiled.polygons)))
+    assert shared > 0.93 * max(whole.areas.sum(), tiled.areas.sum())
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        cloud(roofs=(), trees=()),
+        cloud(roofs=(), trees=tuple((x, y, 6.0) for x in range(1010, 1120, 11) for y in range(2010, 2090, 11))),
+        PointCloud(np.array([1010.0]), np.array([2010.0]), np.array([9.0])),
+        PointCloud(np.full(500, 1010.0), np.full(500, 2010.0), np.full(500, 9.0)),
+        PointCloud(*np.full((3, 400), np.nan)),
+        PointCloud(*np.empty((3, 0))),
+    ],
+    ids=["ground", "trees", "one point", "one place", "NaN", "no points"],
+)
+def test_nothing_is_found_where_no_building_is(points):
+    found = detect(points)
+    assert len(found) == 0
+    assert len(make_detector("mpp").detect(Scene("no DEM", EXTENT, points=points), np.random.default_rng(0))) == 0
+
+
+def test_birds_holes_and_broken_points_change_little():
+    points = cloud(4)
+    expected = detect(points)
+    rng = np.random.default_rng(5)
+    odd = rng.choice(len(points), 300, replace=False)
+    z = points.z.copy()
+    z[odd[:100]], z[odd[100:200]], z[odd[200:]] = -999.0, np.nan, 400.0
+    broken = detect(replace(points, z=z))
+    assert len(broken) == len(expected)
+    shared = shapely.intersection(shapely.union_all(expected.polygons), shapely.union_all(broken.polygons)).area
+    assert shared > 0.93 * expected.areas.sum()
+
+
+def test_doubled_points_change_nothing():
+    points = cloud(6)
+    assert wkb(detect(points)) == wkb(detect(points.take(np.repeat(np.arange(len(points)), 2))))
+
+
+def test_without_births_from_data_the_sampler_still_finds_the_houses():
+    found = detect(cloud(7), "mpp[data_births=0,start=empty,hot=30,effort=30]")
+    truth = shapely.union_all([shapely.box(*roof[:4]) for roof in ROOFS])
+    assert shapely.intersection(shapely.union_all(found.polygons), truth).area > 0.85 * truth.area

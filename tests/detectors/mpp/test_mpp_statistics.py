@@ -1,0 +1,166 @@
+"""Rectangle statistics by prefix sums are those of the cells, one by one."""
+
+import math
+
+import naive_mpp as naive
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roofbench.detectors.mpp.energy import Model, configuration_energy, own_energy
+from roofbench.detectors.mpp.rectangles import corners, overlap_area
+from roofbench.detectors.mpp.roofs import FLAT, GABLE_U, GABLE_V, HIP, KINDS, PLANE, fit_roof, scan
+from roofbench.detectors.mpp.tables import MILLI, make_tables
+
+ROWS, COLUMNS = 40, 50
+NONE = np.empty((0, 5))
+
+
+def field(seed=0):
+    """Heights, high cells and scores of a random scene."""
+    rng = np.random.default_rng(seed)
+    height = rng.integers(0, 3000, (ROWS, COLUMNS)).astype(np.int32)
+    high = rng.random((ROWS, COLUMNS)) < 0.7
+    score = np.round(rng.normal(0, 2, (ROWS, COLUMNS)), 3).astype(np.float32)
+    return height, high, score
+
+
+def random_rectangles(rng, n):
+    return np.column_stack(
+        [
+            rng.uniform(5, COLUMNS - 5, n),
+            rng.uniform(5, ROWS - 5, n),
+            rng.uniform(2, 25, n),
+            rng.uniform(2, 25, n),
+            rng.uniform(0, np.pi, n),
+        ]
+    )
+
+
+def model(**changes):
+    values = {
+        "weight": 0.25,
+        "price": 20.0,
+        "overlap": 5.0,
+        "roof_price": 3.0,
+        "least_tau": 0.15,
+        "least_height": 2.5,
+        "cell": 0.5,
+        "void_price": 0.3,
+        "least_side": 2.0,
+        "largest_side": 60.0,
+        "fit_weight": 0.3,
+    }
+    return Model(**{**values, **changes})
+
+
+def test_moments_of_quadrants_are_sums_over_cells():
+    height, high, score = field()
+    tables = make_tables(height, high, score)
+    moments = np.empty((4, 10))
+    for rectangle in random_rectangles(np.random.default_rng(1), 200):
+        total, outside = scan(tables.small, tables.large, rectangle, moments)
+        inside = naive.cells_inside(rectangle, ROWS, COLUMNS)
+        assert total == pytest.approx(np.round(score[inside] * MILLI).sum() / MILLI)
+        bigger = naive.cells_inside(rectangle + np.array([50, 50, 0, 0, 0]), ROWS + 100, COLUMNS + 100)
+        assert outside == bigger.sum() - inside.sum()
+        u, v = naive.frame(rectangle, ROWS, COLUMNS)
+        for quadrant in range(4):
+            held = inside & high & ((u >= 0) == bool(quadrant & 1)) & ((v >= 0) == bool(quadrant & 2))
+            a, b, h = u[held], v[held], 0.01 * height[held]
+            sums = [held.sum(), a, b, a * a, a * b, b * b, h, a * h, b * h, h * h]
+            expected = [np.sum(values) for values in sums]
+            np.testing.assert_allclose(moments[quadrant], expected, rtol=1e-9, atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", [FLAT, PLANE, GABLE_U, GABLE_V, HIP])
+def test_the_roof_that_stands_there_is_found_with_its_spread(kind):
+    rng = np.random.default_rng(kind)
+    rectangle = np.array([25.3, 20.2, 26.0, 14.0, 0.4])
+    u, v = naive.frame(rectangle, ROWS, COLUMNS)
+    surface = {
+        FLAT: 0 * u,
+        PLANE: 0.1 * u - 0.15 * v,
+        GABLE_U: -0.3 * np.abs(v),
+        GABLE_V: -0.3 * np.abs(u),
+        HIP: -0.4 * np.maximum(np.abs(v), np.abs(u) - 6),
+    }[kind]
+    height = np.round(100 * (9 + surface + rng.normal(0, 0.2, u.shape))).astype(np.int32)
+    tables = make_tables(height, np.ones(u.shape, bool), np.zeros(u.shape, np.float32))
+    fit = np.empty(5)
+    likelihood, _, _ = fit_roof(tables.small, tables.large, rectangle, 3.0, 0.15, 2.5, 0.5, fit)
+    inside = naive.cells_inside(rectangle, ROWS, COLUMNS)
+    residuals = naive.roof_residuals(0.01 * height[inside], u[inside], v[inside], 26.0, 14.0)
+    assert KINDS[int(fit[3])] == KINDS[kind]
+    assert fit[0] == inside.sum()
+    assert fit[2] == pytest.approx(math.sqrt(residuals[kind] / inside.sum()), rel=1e-6)
+    price = 3.0 * {FLAT: 0, PLANE: 2}.get(kind, 1)
+    assert likelihood == pytest.approx(naive.log_normal_sum(residuals[kind], inside.sum(), 0.15) - price, rel=1e-9)
+
+
+def test_a_flat_roof_below_the_least_height_is_measured_from_it():
+    tables = make_tables(
+        np.full((ROWS, COLUMNS), 220, np.int32), np.ones((ROWS, COLUMNS), bool), np.zeros((ROWS, COLUMNS), np.float32)
+    )
+    fit = np.empty(5)
+    rectangle = np.array([20.0, 20.0, 10.0, 10.0, 0.0])
+    likelihood, _, _ = fit_roof(tables.small, tables.large, rectangle, 3.0, 0.15, 2.5, 0.5, fit)
+    assert fit[2] == pytest.approx(0.3)
+    assert likelihood == pytest.approx(naive.log_normal_sum(100 * 0.3**2, 100, 0.15))
+
+
+def test_common_area_is_that_of_the_polygons():
+    rng = np.random.default_rng(3)
+    rectangles = random_rectangles(rng, 120)
+    polygons = shapely.polygons(corners(rectangles))
+    for i in range(0, 120, 2):
+        exact = shapely.area(shapely.intersection(polygons[i], polygons[i + 1]))
+        assert overlap_area(rectangles[i], rectangles[i + 1]) == pytest.approx(exact, abs=1e-9)
+
+
+def test_a_nested_rectangle_shares_its_whole_area_and_touching_ones_nothing():
+    outer, inner = np.array([10.0, 10, 8, 6, 0.3]), np.array([10.5, 9.8, 2, 1, 1.2])
+    assert overlap_area(outer, inner) == pytest.approx(2.0)
+    assert overlap_area(outer, outer) == pytest.approx(48.0)
+    assert overlap_area(np.array([0.0, 0, 4, 4, 0]), np.array([4.0, 0, 4, 4, 0])) == pytest.approx(0, abs=1e-12)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), down=st.integers(0, 7), right=st.integers(0, 9))
+def test_energy_does_not_change_with_shift_by_cells_quarter_turn_or_mirror(seed, down, right):
+    rng = np.random.default_rng(seed)
+    height, high, score = field(seed)
+    rectangles = random_rectangles(rng, 4)
+
+    def energy(height, high, score, rectangles):
+        tables = make_tables(height, high, score)
+        return configuration_energy(tables.small, tables.large, rectangles, len(rectangles), NONE, model(void_price=0))
+
+    expected = energy(height, high, score, rectangles)
+    pad = ((down, 3), (right, 2))
+    shifted = [np.pad(array, pad) for array in (height, high, score)]
+    assert energy(*shifted, rectangles + np.array([right, down, 0, 0, 0])) == pytest.approx(expected, rel=1e-12)
+
+    def turned(array):
+        return np.ascontiguousarray(np.rot90(array, -1))
+
+    quarter = rectangles.copy()
+    quarter[:, 0], quarter[:, 1] = ROWS - rectangles[:, 1], rectangles[:, 0]
+    quarter[:, 4] = (rectangles[:, 4] + np.pi / 2) % np.pi
+    assert energy(turned(height), turned(high), turned(score), quarter) == pytest.approx(expected, rel=1e-9)
+
+    mirror = rectangles.copy()
+    mirror[:, 0], mirror[:, 4] = COLUMNS - rectangles[:, 0], (np.pi - rectangles[:, 4]) % np.pi
+    flipped = [np.ascontiguousarray(array[:, ::-1]) for array in (height, high, score)]
+    assert energy(*flipped, mirror) == pytest.approx(expected, rel=1e-9)
+
+
+def test_both_descriptions_of_one_shape_have_one_energy():
+    tables = make_tables(*field(5))
+    for rectangle in random_rectangles(np.random.default_rng(6), 20):
+        other = rectangle[[0, 1, 3, 2, 4]]
+        other[4] = (other[4] + np.pi / 2) % np.pi
+        first = own_energy(tables.small, tables.large, rectangle, model())
+        assert own_energy(tables.small, tables.large, other, model()) == pytest.approx(first, rel=1e-9)
