@@ -16,8 +16,9 @@ Nothing is learned and nothing is random: the same points give the same footprin
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -28,22 +29,20 @@ from ..scenes.parameters import parameter
 from ..scenes.points import PointCloud
 from ..scenes.raster import Grid
 from ..scenes.scene import Scene
-from .base import Detector
+from .base import Detector, Step
 from .cues import CellCues, cell_cues, greenness
 from .heights import ground_of, heights_above_ground
 from .outlines import coverage_of_mask, minimum_rectangles, trace
 from .regularise import regularise
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["NDSM"]
+__all__ = ["NDSM", "Work"]
 
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
 
-#: Colour tells less than the laser: roofs may be green, autumn trees are not, and roofs lean in the image.
-_IMAGE_WEIGHT = 0.5
+#: Name of the image's cue, and its weight besides the laser's, which weigh 1: roofs may be green, autumn trees are
+#: not, and roofs lean in the image.
+_IMAGE, _IMAGE_WEIGHT = "image vegetation", 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,9 +123,16 @@ class NDSM(Detector):
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Return the buildings of a scene; attributes `height` (mean above ground, m) and `tree_likeness` (-1..1)."""
-        return self._work(scene).footprints
+        return self.work(scene).footprints
 
-    def _work(self, scene: Scene) -> _Work:
+    def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
+        """Yield heights, cues, likeness to trees, mask and outlines."""
+        from .ndsm_drawing import draw_steps
+
+        yield from draw_steps(self.work(scene))
+
+    def work(self, scene: Scene) -> Work:
+        """Detect, and return every intermediate result."""
         scene = scene.for_detection()
         points = scene.points
         assert points is not None
@@ -134,15 +140,15 @@ class NDSM(Detector):
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
         high = np.nan_to_num(cues.high_share) >= 0.5
-        likeness = self._tree_likeness(cues, self._vegetation(scene, grid))
-        likeness = _averaged(likeness, high, self.smoothing / grid.gsd)
+        said = self._said(cues, self._vegetation(scene, grid))
+        likeness = _averaged(_mean_of(said, grid.shape), high, self.smoothing / grid.gsd)
         roof = high & ((likeness < 0) | np.isnan(likeness))
         mask = self._clean(roof, grid.gsd)
-        share = np.where(likeness > 0, np.float32(0), cues.high_share)
-        coverage = coverage_of_mask(mask, share)
-        traced = trace(coverage, grid)
-        return _Work(
+        traced = trace(coverage_of_mask(mask, np.where(likeness > 0, np.float32(0), cues.high_share)), grid)
+        return Work(
             cues=cues,
+            high=high,
+            said=said,
             likeness=likeness,
             roof=roof,
             mask=mask,
@@ -159,24 +165,20 @@ class NDSM(Detector):
         index = None if threshold is None else greenness(image, grid, darkest=self.darkest)
         return None if index is None or threshold is None else (index, threshold)
 
-    def _tree_likeness(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> _Floats:
-        """Return the mean of what the cues say: -1 roof, +1 tree, NaN where none says anything."""
-        cues_used: tuple[tuple[_Floats | None, float | None, float, float], ...] = (
-            (cues.multiple_share, self.multiple_share, 0.25, 1.0),
-            (cues.roughness, self.roughness, 0.2, 1.0),
-            (cues.penetration, self.penetration, 0.15, 1.0),
-            (*(vegetation or (None, None)), 0.05, _IMAGE_WEIGHT),
-        )
-        total = np.zeros(cues.grid.shape, dtype=np.float32)
-        weights = np.zeros(cues.grid.shape, dtype=np.float32)
-        for value, threshold, width, weight in cues_used:
-            if value is None or threshold is None:
-                continue
-            said = np.clip((value - np.float32(threshold)) / np.float32(width), -1, 1)
-            told = np.isfinite(said)
-            total += np.where(told, np.float32(weight) * said, 0)
-            weights += np.float32(weight) * told
-        return np.where(weights > 0, total / np.where(weights > 0, weights, 1), np.float32(np.nan))
+    def _said(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> dict[str, _Floats]:
+        """Return what each cue says of each cell: -1 roof, 0 at its threshold, +1 tree, NaN nothing."""
+        index, least_index = vegetation or (None, None)
+        rules = {
+            "multiple returns": (cues.multiple_share, self.multiple_share, 0.25),
+            "roughness": (cues.roughness, self.roughness, 0.2),
+            "penetration": (cues.penetration, self.penetration, 0.15),
+            _IMAGE: (index, least_index, 0.05),
+        }
+        return {
+            name: np.clip((value - np.float32(threshold)) / np.float32(width), -1, 1)
+            for name, (value, threshold, width) in rules.items()
+            if value is not None and threshold is not None
+        }
 
     def _clean(self, roof: _Mask, cell: float) -> _Mask:
         """Fill small holes and open."""
@@ -206,10 +208,28 @@ class NDSM(Detector):
 
 
 @dataclass(frozen=True, eq=False)
-class _Work:
-    """All intermediate results of one detection."""
+class Work:
+    """All intermediate results of one detection; rasters of shape (rows, columns).
+
+    Attributes
+    ----------
+    cues : CellCues
+    high : ndarray of bool
+        Cells at least half of whose points are high.
+    said : dict of str to ndarray of float32
+        Per cue: -1 roof, +1 tree, NaN nothing.
+    likeness : ndarray of float32
+        Their mean over the neighbourhood.
+    roof, mask : ndarray of bool
+        High cells that look like a roof, before and after cleaning.
+    traced : ndarray of Polygon
+        Outlines of the mask, all vertices.
+    footprints : Footprints
+    """
 
     cues: CellCues
+    high: _Mask
+    said: dict[str, _Floats]
     likeness: _Floats
     roof: _Mask
     mask: _Mask
@@ -230,6 +250,17 @@ def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple
         return 1.0
     spacing = math.sqrt(covered * 4.0 / np.count_nonzero(used))
     return min(max(round(1.4 * spacing / 0.05) * 0.05, 0.25), 2.0)
+
+
+def _mean_of(said: dict[str, _Floats], shape: tuple[int, int]) -> _Floats:
+    """Return the weighted mean of what the cues say; NaN where none says anything."""
+    total, weights = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
+    for name, cue in said.items():
+        weight = np.float32(_IMAGE_WEIGHT if name == _IMAGE else 1)
+        told = np.isfinite(cue)
+        total += np.where(told, weight * cue, 0)
+        weights += weight * told
+    return np.where(weights > 0, total / np.where(weights > 0, weights, 1), np.float32(np.nan))
 
 
 def _averaged(likeness: _Floats, high: _Mask, sigma: float) -> _Floats:

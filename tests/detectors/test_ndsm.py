@@ -190,3 +190,24 @@ def test_the_same_points_in_another_order_give_the_same_footprints():
 
 def test_it_is_found_by_name():
     assert make_detector("ndsm[height=3,outline=rectangle]") == NDSM(height=3, outline="rectangle")
+
+
+def test_each_step_can_be_drawn():
+    from matplotlib.figure import Figure
+
+    place = Place().roof(rectangle(14, 9, 20)).tree(translate(CENTRE, 18, 10).buffer(4))
+    scene = place.scene(image=green_image(translate(CENTRE, 18, 10).buffer(4), nir=False))
+    steps = list(NDSM().steps(scene, RNG))
+    assert [step.name for step in steps] == ["01-heights", "02-cues", "03-likeness", "04-mask", "05-outlines"]
+    for step in steps:
+        figure = Figure()
+        step.draw(figure)
+        assert figure.axes
+
+
+def test_steps_without_points_can_be_drawn():
+    from matplotlib.figure import Figure
+
+    none = np.empty(0)
+    for step in NDSM().steps(Scene("empty", EXTENT, points=PointCloud(none, none, none)), RNG):
+        step.draw(Figure())
