@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .scenes.errors import RoofbenchError
     from .scenes.folder import open_scene, save_scene
     from .scenes.footprints import Footprints
+    from .scenes.importing import import_scene
     from .scenes.parameters import parameter
     from .scenes.points import PointCloud
     from .scenes.raster import Elevation, Grid, Image
@@ -46,6 +47,7 @@ _HOMES = {
     "Step": "detectors.base",
     "detect": "benchmark.session",
     "evaluate": "evaluators.comparison",
+    "import_scene": "scenes.importing",
     "make_detector": "detectors.registry",
     "make_evaluator": "evaluators.registry",
     "make_scene": "scenes.synthetic",
@@ -73,6 +75,7 @@ __all__ = [
     "Step",
     "detect",
     "evaluate",
+    "import_scene",
     "make_detector",
     "make_evaluator",
     "make_scene",

@@ -41,6 +41,8 @@ _SUPPORT_HEIGHT, _SUPPORT, _SUPPORT_SHARE = 1.0, 3, 0.05
 _TREND_BLOCK = 5.0
 #: Windows up to this radius in metres remove what they remove, walls or not: shrubs and crowns have ragged borders.
 _NARROW = 6.0
+#: Points put on the grid at a time, so that a large cloud is not copied.
+_CHUNK = 2_000_000
 #: Share of the border of a wide object that must be wall.
 _WALLED = 0.7
 
@@ -98,7 +100,9 @@ def ground_surface(
     return _averaged(x, y, z, grid, ground + trend, tolerance)
 
 
-def elevation_from_points(points: PointCloud, extent: Sequence[float], *, cell: float | None = None) -> Elevation:
+def elevation_from_points(
+    points: PointCloud, extent: Sequence[float], *, cell: float | None = None, classes: Sequence[int] | None = None
+) -> Elevation:
     """Return the mean height of points per cell, with cells without points interpolated.
 
     Made for points that are known to be ground; a cloud without a finite point gives NaN everywhere.
@@ -110,15 +114,23 @@ def elevation_from_points(points: PointCloud, extent: Sequence[float], *, cell: 
         ``(xmin, ymin, xmax, ymax)``, metres.
     cell : float, optional
         Cell size in metres; by default as in `ground_surface`.
+    classes : sequence of int, optional
+        Use only points of these ASPRS classes; all when not given.
     """
-    x, y, z = _finite(points)
-    grid = Grid.covering(extent, cell or default_cell(x, y, extent))
-    index, inside = grid.cells(x, y)
-    index, height = index[inside], z[inside]
+    grid = Grid.covering(extent, cell or default_cell(points.x, points.y, extent))
     size = grid.rows * grid.columns
-    count = np.bincount(index, minlength=size)
-    base = float(height.min()) if len(height) else 0.0
-    total = np.bincount(index, weights=height - base, minlength=size)
+    count, total = np.zeros(size, dtype=np.int64), np.zeros(size)
+    # Heights above sea are large against the spread in a cell.
+    base = float(points.z[np.isfinite(points.z).argmax()]) if np.isfinite(points.z).any() else 0.0
+    for start in range(0, len(points), _CHUNK):
+        part = points.take(slice(start, start + _CHUNK))
+        if classes is not None and part.classification is not None:
+            part = part.take(np.isin(part.classification, classes))
+        x, y, z = _finite(part)
+        index, inside = grid.cells(x, y)
+        index = index[inside]
+        count += np.bincount(index, minlength=size)
+        total += np.bincount(index, weights=z[inside] - base, minlength=size)
     mean = np.full(size, np.nan)
     np.divide(total, count, out=mean, where=count > 0)
     return Elevation(fill_unknown((mean + base).astype(np.float32).reshape(grid.shape)), grid)

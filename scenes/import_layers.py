@@ -78,6 +78,7 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
     names = some([header.path for header in clouds])
     if len(cloud) == 0:
         raise InputError(f"{names} has no points in {text(place.extent)}: choose another --extent")
+    _check_bounds(place, cloud, names)
     if cloud.classification is not None:
         noise = np.isin(cloud.classification, _NOISE)
         if noise.any():
@@ -139,18 +140,23 @@ def dem_of(place: Place, models: Sequence[RasterHeader], cell: float | None, poi
     return dem
 
 
-def dem_of_points(place: Place, points: PointCloud, cell: float | None) -> Elevation:
+def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_filter: str | None) -> Elevation:
     """Return the bare earth that the points give: of those classified as ground, else by a ground filter."""
     from .ground import elevation_from_points, ground_surface
 
     classes = points.classification
-    if classes is not None and np.any(classes == _GROUND):
-        lowest = points.take(np.isin(classes, (_GROUND, _WATER)))
-        dem = elevation_from_points(lowest, place.extent, cell=cell or 1.0)
+    if ground_filter == "cloth":
+        from .ground_cloth import cloth_surface
+
+        dem = cloth_surface(points, place.extent, cell=cell)
+        how = "by a cloth simulation filter"
+    elif ground_filter is None and classes is not None and np.any(classes == _GROUND):
+        dem = elevation_from_points(points, place.extent, cell=cell or 1.0, classes=(_GROUND, _WATER))
         how = "from the points of classes 2 (ground) and 9 (water), gaps interpolated"
     else:
         dem = ground_surface(points, place.extent, cell=cell)
-        how = "by a ground filter, since no point is classified as ground"
+        why = ", since no point is classified as ground" if ground_filter is None else ""
+        how = f"by a ground filter (progressive opening){why}"
     how = place.log.derived["dem"] = f"{how}, at {dem.grid.gsd:g} m"
     place.log.note(f"the DEM was derived {how}")
     return dem
@@ -233,6 +239,18 @@ def area_of_extent(place: Place, reference: Footprints) -> shapely.Geometry | No
     place.log.derived["area"] = "the extent of the scene, since footprints of the reference reach beyond it"
     place.log.note(f"footprints that reach beyond the scene: {beyond}; its extent was made the evaluation area")
     return box
+
+
+def _check_bounds(place: Place, cloud: PointCloud, names: str) -> None:
+    """Refuse a header whose bounds are far wider than its points: grids of that size would fill the memory."""
+    xmin, ymin, xmax, ymax = place.extent
+    real = (cloud.x.min(), cloud.y.min(), cloud.x.max(), cloud.y.max())
+    share = (real[2] - real[0]) * (real[3] - real[1]) / ((xmax - xmin) * (ymax - ymin))
+    if (xmax - xmin) * (ymax - ymin) > 1e7 and share < 0.25:
+        raise InputError(
+            f"{names}: the header says {text(place.extent)}, but the points lie in {text(real)}: give "
+            f"--extent {real[0]:.0f} {real[1]:.0f} {real[2]:.0f} {real[3]:.0f}"
+        )
 
 
 def _grid(place: Place, header: RasterHeader, size: float | None) -> Grid:

@@ -47,6 +47,7 @@ def import_scene(
     bands: Sequence[str] | None = None,
     gsd: float | None = None,
     dem_cell: float | None = None,
+    ground_filter: str | None = None,
     building_id: str | None = None,
     reference_from_class: bool = False,
     ortho_from_points: bool = False,
@@ -84,6 +85,8 @@ def import_scene(
         Cell size of the orthoimage, metres; by default that of the first file, or one that suits the points.
     dem_cell : float, optional
         Cell size of the DEM, metres; by default that of the file, 1 m when derived (more for sparse points).
+    ground_filter : str, optional
+        ``"opening"`` or ``"cloth"`` (extra ``ground``): derive the DEM by this filter even from classified points.
     building_id : str, optional
         Column of the reference that tells which footprints are one building.
     reference_from_class : bool
@@ -123,6 +126,10 @@ def import_scene(
         },
         {"gsd": gsd, "dem-cell": dem_cell},
     )
+    if ground_filter not in (None, "opening", "cloth"):
+        raise ParameterError(f"--ground-filter must be opening or cloth, not {ground_filter!r}")
+    if ground_filter is not None and dem_files:
+        raise ParameterError("give --dem or --ground-filter, not both")
     wanted = None if extent is None else _checked_extent(extent)
     target = Path(output)
     if target.exists() and not overwrite:
@@ -151,7 +158,7 @@ def import_scene(
     if models:
         ground = layers.dem_of(place, models, dem_cell, cloud)
     elif cloud is not None:
-        ground = layers.dem_of_points(place, cloud, dem_cell)
+        ground = layers.dem_of_points(place, cloud, dem_cell, ground_filter)
     if cloud is not None and reference_from_class:
         footprints = layers.reference_of_class(place, cloud, point_files)
     if footprints is not None and as_rectangles:

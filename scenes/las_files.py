@@ -277,8 +277,8 @@ def _refuse_cut_off(file: Path, header: Any) -> None:
 
 def _chunks(header: LasHeader, window: tuple[float, float, float, float] | None) -> Iterator[Any]:
     """Yield the points of a file by chunk; of a COPC file only those of the octree nodes in the window."""
-    if header.is_copc and window is not None:
-        yield from _copc_chunk(header.path, window)
+    if header.is_copc and window is not None and not _covers(window, header.bounds):
+        yield _copc_points(header, window)
         return
     with _opened(header.path) as reader:
         found = 0
@@ -292,18 +292,23 @@ def _chunks(header: LasHeader, window: tuple[float, float, float, float] | None)
         )
 
 
-def _copc_chunk(file: Path, window: tuple[float, float, float, float]) -> Iterator[Any]:
+def _copc_points(header: LasHeader, window: tuple[float, float, float, float]) -> Any:
     import laspy
     from laspy.errors import LaspyException
     from lazrs import LazrsError
 
-    low, high = np.array(window[:2]), np.array(window[2:])
+    # Cut to the points, since laspy turns the window into 32 bit numbers.
+    low = np.maximum(window[:2], header.bounds[:2])
+    high = np.minimum(window[2:], header.bounds[3:5])
     try:
-        with laspy.CopcReader.open(file) as reader:
-            points = reader.query(laspy.copc.Bounds(mins=low, maxs=high))
+        with laspy.CopcReader.open(header.path) as reader:
+            return reader.query(laspy.copc.Bounds(mins=low, maxs=high))
     except (LaspyException, LazrsError, OSError, RuntimeError, ValueError) as error:
-        raise InputError(f"{file} is truncated or broken ({error}): copy or download it again") from error
-    yield points
+        raise InputError(f"{header.path} is truncated or broken ({error}): copy or download it again") from error
+
+
+def _covers(window: tuple[float, float, float, float], bounds: tuple[float, float, float, float, float, float]) -> bool:
+    return window[0] <= bounds[0] and window[1] <= bounds[1] and window[2] >= bounds[3] and window[3] >= bounds[4]
 
 
 def _meet(window: tuple[float, float, float, float], bounds: tuple[float, float, float, float, float, float]) -> bool:

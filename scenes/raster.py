@@ -23,6 +23,9 @@ from .errors import InputError
 
 __all__ = ["Elevation", "Grid", "Image"]
 
+#: Rows of points put on a grid at a time.
+_CHUNK = 1_000_000
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -73,6 +76,15 @@ class Grid:
 
     def cells(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Return the flat cell index of each point and whether it lies on the grid (index 0 where it does not)."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        flat, inside = np.empty(x.shape, dtype=np.intp), np.empty(x.shape, dtype=bool)
+        # In parts, so that many points do not need several arrays of their size at once.
+        for start in range(0, len(x) if x.ndim else 0, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            flat[part], inside[part] = self._cells(x[part], y[part])
+        return (flat, inside) if x.ndim else self._cells(x, y)
+
+    def _cells(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         row, column = self.to_pixel(x, y)
         inside = (row >= 0) & (row < self.rows) & (column >= 0) & (column < self.columns)
         flat = np.where(inside, np.floor(row) * self.columns + np.floor(column), 0)

@@ -55,6 +55,10 @@ def import_(
     ] = None,
     gsd: Annotated[float | None, typer.Option(help="Cell size of the orthoimage, m; default: its own.")] = None,
     dem_cell: Annotated[float | None, typer.Option(help="Cell size of the DEM, m; default: its own, or 1 m.")] = None,
+    ground_filter: Annotated[
+        str | None,
+        typer.Option(help="Derive the DEM by this filter, opening or cloth; default: ground points, else opening."),
+    ] = None,
     building_id: Annotated[
         str | None, typer.Option(help="Column of the reference: footprints of one value are one building.")
     ] = None,
@@ -96,6 +100,7 @@ def import_(
             bands=None if bands is None else [band.strip() for band in bands.split(",")],
             gsd=gsd,
             dem_cell=dem_cell,
+            ground_filter=ground_filter,
             building_id=building_id,
             reference_from_class=reference_from_class,
             ortho_from_points=ortho_from_points,

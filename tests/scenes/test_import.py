@@ -9,11 +9,12 @@ import rasterio
 import shapely
 import small_scenes
 from command_line import run
+from copc_files import write_copc
 from rasterio import Affine
 
 import roofbench as rb
 from roofbench.scenes.importing import import_scene
-from roofbench.scenes.las_files import read_points, write_points
+from roofbench.scenes.las_files import read_las_header, read_points, write_points
 from roofbench.scenes.raster_files import write_elevation, write_image
 
 CRS, WEST, SOUTH = small_scenes.CRS, small_scenes.WEST, small_scenes.SOUTH
@@ -127,7 +128,16 @@ def test_a_dem_is_derived_by_a_ground_filter_without_classes(files, bring):
     write_points(small_scenes.cloud().unclassified(), files / "raw.laz", crs=CRS)
     code, _, err = bring("raw.laz")
     assert code == 0
-    assert "by a ground filter" in err
+    assert "by a ground filter (progressive opening), since no point is classified as ground" in err
+    assert np.abs(rb.open_scene(files / "out").dem.values - 100.0).max() < 0.3
+
+
+def test_a_dem_is_derived_by_a_cloth_on_request(files, bring):
+    pytest.importorskip("CSF", reason="the extra 'ground' is not installed")
+    code, out, err = bring("points.laz", "--ground-filter", "cloth")
+    assert code == 0
+    assert out == "out: scene 'out' with points, dem\n", "the library prints, the command must not"
+    assert "the DEM was derived by a cloth simulation filter, at 1" in err
     assert np.abs(rb.open_scene(files / "out").dem.values - 100.0).max() < 0.3
 
 
@@ -566,6 +576,8 @@ def test_an_area_of_another_place(files, refused):
         (["points.laz", "ortho.tif", "--gsd", "0"], "--gsd must be from 0.01 to 100 m, not 0"),
         (["points.laz", "--extent", "5", "5", "1", "9"], "must be xmin ymin xmax ymax"),
         (["points.laz", "--extent", "0", "0", "9", "9"], "--extent covers x 0.0 to 9.0"),
+        (["points.laz", "--ground-filter", "magic"], "--ground-filter must be opening or cloth, not 'magic'"),
+        (["points.laz", "--dem", "dem.tif", "--ground-filter", "cloth"], "--dem or --ground-filter, not both"),
         (["reference.gpkg"], "reference.gpkg ends neither as a point file"),
     ],
 )
@@ -580,7 +592,36 @@ def test_a_folder_that_cannot_be_written(files, monkeypatch):
     assert "no/such/folder cannot be written: there is no folder no/such" in err
 
 
+def test_a_header_with_wrong_bounds(files, refused):
+    content = bytearray((files / "points.laz").read_bytes())
+    struct.pack_into("<d", content, 187, 0.0)  # the least x (LAS 1.4 R15, table 3)
+    (files / "wide.laz").write_bytes(content)
+    message = refused("wide.laz")
+    assert "wide.laz: the header says x 0.0 to 500040.0" in message
+    assert "give --extent 500000 5700000 500040 5700040" in message
+
+
 # Windows and chunks
+
+
+@pytest.mark.parametrize("east", [0, 18, 30])
+def test_a_copc_file_is_read_whole_and_by_window(tmp_path, east):
+    cloud = small_scenes.cloud(5000)
+    write_copc(tmp_path / "points.copc.laz", cloud, crs=CRS)
+    header = read_las_header(tmp_path / "points.copc.laz")
+    assert (header.is_copc, header.count, header.crs) == (True, 5000, CRS)
+    assert len(read_points(tmp_path / "points.copc.laz")) == 5000
+    window = (WEST + east, SOUTH - 1e7, WEST + east + 9, SOUTH + 20)
+    part = read_points(tmp_path / "points.copc.laz", window=window)
+    inside = (cloud.x >= window[0]) & (cloud.x <= window[2]) & (cloud.y <= window[3])
+    for column in ("x", "z", "classification"):
+        np.testing.assert_allclose(np.sort(getattr(part, column)), np.sort(getattr(cloud, column)[inside]))
+
+
+def test_a_copc_file_is_imported(files, bring):
+    write_copc(files / "points.copc.laz", small_scenes.cloud(), crs=CRS)
+    assert bring("points.copc.laz", "--clip", WEST, SOUTH, WEST + 20, SOUTH + 40)[0] == 0
+    assert len(rb.open_scene(files / "out").points) == np.count_nonzero(small_scenes.cloud().x <= WEST + 20)
 
 
 def test_a_window_and_chunks_give_the_same_points_as_the_whole(tmp_path, monkeypatch):
