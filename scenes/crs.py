@@ -57,7 +57,7 @@ def _horizontal(text: str) -> CRS:
     return crs
 
 
-def require_metric(text: str | None, where: str) -> None:
+def require_metric(text: str | None, where: str, *, heights: bool = True) -> None:
     """Raise `CRSError` unless the CRS is projected, with axes (and heights, if it names them) in metres.
 
     None (not known) passes.
@@ -68,6 +68,8 @@ def require_metric(text: str | None, where: str) -> None:
         CRS as text.
     where : str
         File or argument that it belongs to, for the message.
+    heights : bool
+        Whether heights matter; for footprints they do not.
     """
     if text is None:
         return
@@ -83,6 +85,8 @@ def require_metric(text: str | None, where: str) -> None:
             f"{where}: {crs_label(text)} is in {unit.unit_name}, metres are needed: reproject it, "
             "for instance with ogr2ogr -t_srs, gdalwarp -t_srs or pdal's filters.reprojection"
         )
+    if not heights:
+        return
     whole = parse_crs(text)
     for part in whole.sub_crs_list if whole.is_compound else [whole]:
         for axis in part.axis_info:

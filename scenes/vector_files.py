@@ -104,7 +104,7 @@ def read_footprints(
     if to_crs is not None:
         geometries, crs = _transformed(file, geometries, crs or to_crs, to_crs), to_crs
     if len(geometries):
-        require_metric(crs, str(file))
+        require_metric(crs, str(file), heights=False)
     identifiers = _building_ids(file, columns, building_id)
     footprints = Footprints.of(geometries, building_ids=identifiers, crs=crs, attributes=columns, source=str(file))
     told = {repair.id for repair in footprints.repairs}

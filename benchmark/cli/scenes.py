@@ -88,7 +88,7 @@ def import_(
     from ...scenes.importing import import_scene
 
     loose_points, loose_images = _sorted_by_ending(_expanded(files))
-    with _point_bar() as progress:
+    with _progress() as (note, progress):
         scene = import_scene(
             output,
             points=[*_expanded(points), *loose_points],
@@ -110,7 +110,7 @@ def import_(
             source=source,
             licence=licence,
             overwrite=overwrite,
-            note=(lambda _: None) if quiet else (lambda sentence: typer.echo(f"- {sentence}", err=True)),
+            note=None if quiet else note,
             progress=progress,
         )
     typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.holdings)}")
@@ -213,10 +213,10 @@ def _sorted_by_ending(files: list[str]) -> tuple[list[str], list[str]]:
 
 
 @contextmanager
-def _point_bar() -> Iterator[Callable[[int, int], None] | None]:
-    """Yield a function that moves a progress bar; None when standard error is no terminal."""
+def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int, int], None] | None]]:
+    """Yield what tells a note and what moves a bar; there is a bar only when standard error is a terminal."""
     if not sys.stderr.isatty():
-        yield None
+        yield (lambda sentence: typer.echo(f"- {sentence}", err=True)), None
         return
     from rich.console import Console
     from rich.progress import Progress
@@ -228,6 +228,6 @@ def _point_bar() -> Iterator[Callable[[int, int], None] | None]:
             nonlocal task
             if task is None:
                 task = bar.add_task("reading points", total=total)
-            bar.update(task, completed=done)
+            bar.update(task, completed=done, visible=done < total)
 
-        yield move
+        yield (lambda sentence: bar.console.print(f"- {sentence}", markup=False, highlight=False, soft_wrap=True)), move
