@@ -197,22 +197,34 @@ def reference_of_class(place: Place, points: PointCloud, files: Sequence[Path]) 
     return reference
 
 
+def blocks_of(place: Place, reference: Footprints, gap: float) -> Footprints:
+    """Return the reference with footprints joined over gaps below `gap` (m)."""
+    blocks = reference.joined(gap)
+    _changed_reference(place, f"joined over gaps below {gap:g} m ({len(reference)} footprints, {len(blocks)} blocks)")
+    return blocks
+
+
 def rectangles_of(place: Place, reference: Footprints) -> Footprints:
     """Return the reference as rectangles, with a note on how well they fit."""
     from .rectangles import as_rectangles
 
     rectangles, fit = as_rectangles(reference)
-    how = (
+    _changed_reference(
+        place,
         f"decomposed into rectangles ({fit.footprints} footprints, {fit.rectangles} rectangles, "
-        f"areas agree to {fit.agreement:.1%})"
+        f"areas agree to {fit.agreement:.1%})",
     )
-    before = place.log.derived.get("reference")
-    place.log.derived["reference"] = f"{before}, then {how}" if before else how
-    place.log.note(f"the reference was {how}")
     if fit.poor:
         ids = ", ".join(map(str, fit.poor[:10])) + (", ..." if len(fit.poor) > 10 else "")
         place.log.note(f"footprints that rectangles do not fit (areas agree below 80%): {ids}")
     return rectangles
+
+
+def _changed_reference(place: Place, how: str) -> None:
+    """Record and tell what was made of the reference."""
+    before = place.log.derived.get("reference")
+    place.log.derived["reference"] = f"{before}, then {how}" if before else how
+    place.log.note(f"the reference was {how}")
 
 
 def read_area(place: Place, name: str) -> shapely.Geometry:

@@ -52,6 +52,7 @@ def import_scene(
     reference_from_class: bool = False,
     ortho_from_points: bool = False,
     as_rectangles: bool = False,
+    join_gaps: float | None = None,
     extent: Sequence[float] | None = None,
     name: str | None = None,
     source: str | None = None,
@@ -95,6 +96,8 @@ def import_scene(
         Derive the orthoimage from coloured points.
     as_rectangles : bool
         Decompose the reference into rectangles that share a building id.
+    join_gaps : float, optional
+        Join footprints of the reference over gaps below this, metres: the houses of a row become blocks.
     extent : sequence of float, optional
         ``(xmin, ymin, xmax, ymax)``, metres: what to keep.
     name, source, licence : str, optional
@@ -123,6 +126,7 @@ def import_scene(
             "reference-from-class": reference_from_class,
             "ortho-from-points": ortho_from_points,
             "as-rectangles": as_rectangles,
+            "join-gaps": join_gaps is not None,
         },
         {"gsd": gsd, "dem-cell": dem_cell},
     )
@@ -161,6 +165,8 @@ def import_scene(
         ground = layers.dem_of_points(place, cloud, dem_cell, ground_filter)
     if cloud is not None and reference_from_class:
         footprints = layers.reference_of_class(place, cloud, point_files)
+    if footprints is not None and join_gaps is not None:
+        footprints = layers.blocks_of(place, footprints, join_gaps)
     if footprints is not None and as_rectangles:
         footprints = layers.rectangles_of(place, footprints)
     if footprints is not None and complete is None:
@@ -192,8 +198,9 @@ def _check_choices(given: dict[str, object], asked: dict[str, bool], lengths: di
     for other in ("reference-from-class", "ortho-from-points"):
         if asked[other] and not given["points"]:
             raise ParameterError(f"--{other} needs points: give --points")
-    if asked["as-rectangles"] and not (given["reference"] or asked["reference-from-class"]):
-        raise ParameterError("--as-rectangles needs a reference: give --reference or --reference-from-class")
+    for option in ("as-rectangles", "join-gaps"):
+        if asked[option] and not (given["reference"] or asked["reference-from-class"]):
+            raise ParameterError(f"--{option} needs a reference: give --reference or --reference-from-class")
     if given["building-id"] and not given["reference"]:
         raise ParameterError("--building-id names a column of the reference: give --reference")
     for name, value in lengths.items():

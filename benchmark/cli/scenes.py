@@ -71,6 +71,9 @@ def import_(
     as_rectangles: Annotated[
         bool, typer.Option("--as-rectangles", help="Decompose the reference into rectangles with a common building id.")
     ] = False,
+    join_gaps: Annotated[
+        float | None, typer.Option(help="Join reference footprints over gaps below this, m: houses of a row to blocks.")
+    ] = None,
     extent: Annotated[
         tuple[float, float, float, float] | None,
         typer.Option("--extent", "--clip", help="Keep only xmin ymin xmax ymax, metres."),
@@ -105,6 +108,7 @@ def import_(
             reference_from_class=reference_from_class,
             ortho_from_points=ortho_from_points,
             as_rectangles=as_rectangles,
+            join_gaps=join_gaps,
             extent=extent,
             name=name,
             source=source,

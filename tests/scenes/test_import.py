@@ -289,6 +289,15 @@ def test_an_l_shape_becomes_rectangles_of_one_building(files, bring):
     assert len(set(reference.building_ids.tolist())) == 1
 
 
+def test_houses_of_a_row_are_joined_to_blocks(files, bring):
+    row = [shapely.box(WEST + 6 * k, SOUTH + 5, WEST + 6 * k + 5.95, SOUTH + 14) for k in range(3)]
+    rb.write_footprints(rb.Footprints.of(row, crs=CRS), files / "row.gpkg")
+    code, _, err = bring("points.laz", "--reference", "row.gpkg", "--join-gaps", 0.1)
+    assert code == 0
+    assert "joined over gaps below 0.1 m (3 footprints, 1 blocks)" in err
+    assert rb.open_scene(files / "out").reference.areas.tolist() == pytest.approx([17.95 * 9])
+
+
 def test_noise_and_withheld_points_are_left_out(files, bring):
     cloud = small_scenes.cloud()
     cloud.classification[:3] = (7, 18, 7)
@@ -572,6 +581,7 @@ def test_an_area_of_another_place(files, refused):
         (["points.laz", "ortho.tif", "--ortho-from-points"], "not both"),
         (["ortho.tif", "--reference-from-class"], "needs points: give --points"),
         (["points.laz", "--as-rectangles"], "--as-rectangles needs a reference"),
+        (["points.laz", "--join-gaps", 0.1], "--join-gaps needs a reference"),
         (["points.laz", "--building-id", "id"], "give --reference"),
         (["points.laz", "ortho.tif", "--gsd", "0"], "--gsd must be from 0.01 to 100 m, not 0"),
         (["points.laz", "--extent", "5", "5", "1", "9"], "must be xmin ymin xmax ymax"),
