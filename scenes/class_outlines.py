@@ -17,6 +17,8 @@ from .raster import Grid
 
 __all__ = ["BUILDING_CLASS", "outlines_of_class"]
 
+#: How far an outline may move when it is simplified, in cells.
+_TOLERANCE = 1.5
 #: ASPRS LAS 1.4 R15, table 17.
 BUILDING_CLASS = 6
 
@@ -83,11 +85,11 @@ def outlines_of_class(
 
 
 def _cell(x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, float, float, float]) -> float:
-    """Return the cell size that holds two points where the median of the 2 m cells with points is."""
+    """Return the cell size that holds two points where a typical point lies, by the counts of cells of 2 m."""
     coarse = Grid.covering(extent, 2.0)
     index, inside = coarse.cells(x, y)
-    counts = np.bincount(index[inside])
-    density = float(np.median(counts[counts > 0])) / 4.0 if inside.any() else 1.0
+    index = index[inside]
+    density = float(np.median(np.bincount(index)[index])) / 4.0 if len(index) else 1.0
     return float(np.clip(np.ceil(20 * np.sqrt(2.0 / density)) / 20, 0.25, 2.0))
 
 
@@ -97,14 +99,14 @@ def _padded(grid: Grid) -> Grid:
 
 
 def _simplified(polygon: shapely.Polygon, cell: float, smallest_hole: float) -> shapely.Polygon:
-    """Return the polygon without stair steps (Douglas-Peucker at 0.9 cells) and without tiny holes.
+    """Return the polygon without stair steps (Douglas-Peucker) and without tiny holes.
 
     It runs through the midpoints of the cell edges: those of a slanting wall lie along it, the corners beside it.
     """
     rings = [_edge_midpoints(ring, cell) for ring in (polygon.exterior, *polygon.interiors)]
     holes = [ring for ring in rings[1:] if shapely.area(shapely.Polygon(ring)) >= smallest_hole]
     smooth = shapely.make_valid(shapely.Polygon(rings[0], holes))
-    parts = shapely.get_parts(shapely.get_parts(shapely.simplify(smooth, 0.9 * cell)))
+    parts = shapely.get_parts(shapely.get_parts(shapely.simplify(smooth, _TOLERANCE * cell)))
     return max(
         (part for part in parts if part.geom_type == "Polygon"), key=lambda part: part.area, default=shapely.Polygon()
     )

@@ -57,7 +57,11 @@ def _horizontal(text: str) -> CRS:
     return crs
 
 
-def require_metric(text: str | None, where: str, *, heights: bool = True) -> None:
+#: How files of other kinds than points get another CRS.
+_REPROJECT = "reproject it, for instance with ogr2ogr -t_srs or gdalwarp -t_srs"
+
+
+def require_metric(text: str | None, where: str, *, heights: bool = True, remedy: str | None = None) -> None:
     """Raise `CRSError` unless the CRS is projected, with axes (and heights, if it names them) in metres.
 
     None (not known) passes.
@@ -70,6 +74,8 @@ def require_metric(text: str | None, where: str, *, heights: bool = True) -> Non
         File or argument that it belongs to, for the message.
     heights : bool
         Whether heights matter; for footprints they do not.
+    remedy : str, optional
+        What to do, for the message; by default to reproject rasters and vector files or to name the true CRS.
     """
     if text is None:
         return
@@ -77,14 +83,11 @@ def require_metric(text: str | None, where: str, *, heights: bool = True) -> Non
     if crs.is_geographic:
         raise CRSError(
             f"{where}: {crs_label(text)} is geographic (degrees), areas and distances need metres: "
-            "reproject it, for instance with ogr2ogr -t_srs or gdalwarp -t_srs, or name its true CRS with --crs"
+            f"{remedy or _REPROJECT + ', or name its true CRS with --crs'}"
         )
     unit = crs.axis_info[0] if crs.axis_info else None
     if unit is not None and abs(unit.unit_conversion_factor - 1.0) > 1e-9:
-        raise CRSError(
-            f"{where}: {crs_label(text)} is in {unit.unit_name}, metres are needed: reproject it, "
-            "for instance with ogr2ogr -t_srs, gdalwarp -t_srs or pdal's filters.reprojection"
-        )
+        raise CRSError(f"{where}: {crs_label(text)} is in {unit.unit_name}, metres are needed: {remedy or _REPROJECT}")
     if not heights:
         return
     whole = parse_crs(text)
@@ -92,8 +95,8 @@ def require_metric(text: str | None, where: str, *, heights: bool = True) -> Non
         for axis in part.axis_info:
             if axis.direction in ("up", "down") and abs(axis.unit_conversion_factor - 1.0) > 1e-9:
                 raise CRSError(
-                    f"{where}: its heights are in {axis.unit_name} ({part.name}), metres are needed: convert them, "
-                    "for instance with pdal's filters.reprojection or filters.assign"
+                    f"{where}: its heights are in {axis.unit_name} ({part.name}), metres are needed: "
+                    f"{remedy or 'convert them'}"
                 )
 
 

@@ -23,10 +23,11 @@ import numpy as np
 
 from . import import_layers as layers
 from .crs import crs_label, require_metric, same_crs
-from .errors import CRSError, InputError, OutputError, ParameterError
+from .errors import CRSError, InputError, ParameterError
 from .folder import open_scene, save_scene
 from .import_layers import Extent, ImportLog, Place
 from .las_files import LasHeader, read_las_header
+from .output import check_target
 from .raster_files import RasterHeader, band_names, read_raster_header, warped_extent
 from .scene import Scene
 
@@ -136,8 +137,7 @@ def import_scene(
         raise ParameterError("give --dem or --ground-filter, not both")
     wanted = None if extent is None else _checked_extent(extent)
     target = Path(output)
-    if target.exists() and not overwrite:
-        raise OutputError(f"{target} exists already: add --overwrite (overwrite=True) or name another folder")
+    check_target(target, overwrite)
     log = ImportLog(note)
 
     clouds = [read_las_header(file) for file in point_files]

@@ -32,10 +32,14 @@ from .points import PointCloud
 
 __all__ = ["LasHeader", "read_las_header", "read_points", "write_points"]
 
+#: Name under which point files are written.
+_SOFTWARE = "roofbench"
 #: Points unpacked at a time; about 100 MB with the scaled coordinates.
 CHUNK = 1_000_000
 #: GeoTIFF codes of linear units that are not metres, in the GeoKeys of LAS up to 1.3.
 _FEET = {9002: "feet", 9003: "US survey feet", 9005: "Clarke's feet"}
+#: How point files get another CRS.
+_REPROJECT = "reproject it, for instance with pdal's filters.reprojection, or correct its record if that is wrong"
 _HORIZONTAL_UNIT_KEY, _VERTICAL_UNIT_KEY = 3076, 4099
 
 
@@ -59,6 +63,8 @@ class LasHeader:
     has_colour, has_nir : bool
         Whether the point format carries red, green, blue, and near infrared (perhaps all 0).
     is_copc : bool
+    software : str
+        What wrote it.
     """
 
     path: Path
@@ -70,6 +76,7 @@ class LasHeader:
     has_colour: bool
     has_nir: bool
     is_copc: bool
+    software: str
 
 
 def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None) -> LasHeader:
@@ -115,6 +122,7 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None) -> 
             has_colour="red" in names,
             has_nir="nir" in names,
             is_copc=bool(header.vlrs.get("CopcInfoVlr")),
+            software=str(header.generating_software),
         )
 
 
@@ -144,6 +152,7 @@ def read_points(
     headers = [read_las_header(file, crs="") for file in files]
     total = sum(header.count for header in headers)
     columns = _Columns(total, colour=any(h.has_colour for h in headers), nir=any(h.has_nir for h in headers))
+    own = all(header.software == _SOFTWARE for header in headers)
     seen = 0
     for header in headers:
         missed = window is not None and not _meet(window, header.bounds)
@@ -152,7 +161,7 @@ def read_points(
             seen += len(chunk)
             if progress is not None:
                 progress(seen, total)
-    return columns.cloud()
+    return columns.cloud(stretch=not own)
 
 
 def write_points(cloud: PointCloud, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
@@ -165,7 +174,7 @@ def write_points(cloud: PointCloud, path: str | os.PathLike[str], *, crs: str | 
     point_format = 6 if cloud.colour is None else 7 if cloud.colour.shape[1] == 3 else 8
     header = laspy.LasHeader(version="1.4", point_format=point_format)
     header.creation_date = datetime.date(2000, 1, 1)
-    header.generating_software = "roofbench"
+    header.generating_software = _SOFTWARE
     header.scales = np.full(3, 0.001)
     if len(cloud):
         header.offsets = np.floor([cloud.x.min(), cloud.y.min(), cloud.z.min()])
@@ -222,7 +231,7 @@ class _Columns:
                 self._colour[new, band] = kept(np.asarray(chunk[name])) if name in names else 0
         self._filled = new.stop
 
-    def cloud(self) -> PointCloud:
+    def cloud(self, *, stretch: bool) -> PointCloud:
         end = self._filled
         small = {name: column[:end] if column[:end].any() else None for name, column in self._small.items()}
         colour = None if self._colour is None else self._colour[:end]
@@ -230,7 +239,7 @@ class _Columns:
             colour = colour[:, :3]
         if colour is not None and not colour.any():
             colour = None
-        if colour is not None and colour.max() <= 255:
+        if colour is not None and stretch and colour.max() <= 255:
             colour *= 257  # written as 8 bit by many programs: to the full range
         return PointCloud(x=self._x[:end], y=self._y[:end], z=self._z[:end], colour=colour, **small)
 
@@ -328,7 +337,7 @@ def _header_crs(file: Path, header: Any) -> str | None:
         ) from error
     if crs is None:
         return None
-    require_metric(crs.to_wkt(), str(file))
+    require_metric(crs.to_wkt(), str(file), remedy=_REPROJECT)
     return crs_text(crs)
 
 
@@ -341,7 +350,4 @@ def _refuse_feet(file: Path, header: Any) -> None:
             unit = _FEET.get(key.value_offset) if key.tiff_tag_location == 0 else None
             if unit and key.id in (_HORIZONTAL_UNIT_KEY, _VERTICAL_UNIT_KEY):
                 what = "coordinates" if key.id == _HORIZONTAL_UNIT_KEY else "heights"
-                raise CRSError(
-                    f"{file}: its {what} are in {unit}, metres are needed: convert them, for instance with pdal's "
-                    "filters.reprojection"
-                )
+                raise CRSError(f"{file}: its {what} are in {unit}, metres are needed: {_REPROJECT}")

@@ -66,6 +66,8 @@ class RasterHeader:
         Whether the cells are square.
     height_unit : str, optional
         Unit of the values of an elevation model where the file tells another one than metres.
+    scale, offset : float
+        From the values in the file to heights: ``value * scale + offset``; mostly 1 and 0.
     """
 
     path: Path
@@ -76,6 +78,8 @@ class RasterHeader:
     dtype: str
     square: bool
     height_unit: str | None
+    scale: float
+    offset: float
 
 
 def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) -> RasterHeader:
@@ -118,6 +122,10 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
         side = min(a, -e)
         grid = Grid(c, f, side, max(1, round(source.height * -e / side)), max(1, round(source.width * a / side)))
         colours = source.colorinterp
+        if colours[0].name == "palette":
+            raise InputError(
+                f"{file} has a colour table instead of bands: expand it, for instance with gdal_translate -expand rgb"
+            )
         count = sum(colour.name != "alpha" for colour in colours)
         return RasterHeader(
             path=file,
@@ -128,6 +136,8 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
             dtype=source.dtypes[0],
             square=abs(a + e) <= 1e-6 * a,
             height_unit=_height_unit(source),
+            scale=source.scales[0],
+            offset=source.offsets[0],
         )
 
 
@@ -141,7 +151,7 @@ def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = No
         Names in the order of the file; ``"-"`` skips one. Without it the descriptions in the file, else by number:
         1 grey, 3 red, green, blue, 4 red, green, blue, nir.
     """
-    header = read_raster_header(path)
+    header = _square(read_raster_header(path))
     names = band_names(header, bands)
     with _opened(header.path) as source:
         indexes, kept = _band_indexes(names)
@@ -152,9 +162,10 @@ def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = No
 
 def read_elevation(path: str | os.PathLike[str]) -> Elevation:
     """Read an elevation model whole, on its own grid; cells without data are NaN."""
-    header = read_raster_header(path)
+    header = _square(read_raster_header(path))
     with _opened(header.path) as source:
         values = source.read(1, masked=True).astype(np.float32).filled(np.nan)
+        values = values * np.float32(header.scale) + np.float32(header.offset)
     return Elevation(values, header.grid)
 
 
@@ -227,7 +238,7 @@ def mosaic_elevation(headers: Sequence[RasterHeader], grid: Grid, *, crs: str) -
             )
         for rows, columns, block, has_data in _warped(header, [1], grid, crs):
             fresh = has_data & np.isfinite(block[0]) & np.isnan(values[rows, columns])
-            values[rows, columns][fresh] = block[0][fresh]
+            values[rows, columns][fresh] = block[0][fresh] * header.scale + header.offset
     return Elevation(values, grid)
 
 
@@ -336,6 +347,12 @@ def _source_crs(file: Path, source: Any) -> str | None:
     except ProjError as error:
         raise CRSError(f"{file}: its CRS cannot be read ({error}): set it with gdal_edit.py -a_srs") from error
     return crs_text(crs)
+
+
+def _square(header: RasterHeader) -> RasterHeader:
+    if not header.square:
+        raise InputError(f"{header.path}: its cells are not square: warp it, for instance with gdalwarp -tr")
+    return header
 
 
 def _height_unit(source: Any) -> str | None:
