@@ -76,16 +76,30 @@ def adjust_to_neighbours(lines: Boxes, *, radius: float, tolerance: float, longe
     return rotation
 
 
-def adjust_to_shape(lines: Boxes, shapes: NDArray[np.int64], *, tolerance: float) -> NDArray[np.float64]:
-    """Return the rotation of each line towards the longest line of its shape, radians, NaN beyond `tolerance`."""
+def adjust_to_shape(
+    lines: Boxes, shapes: NDArray[np.int64], *, tolerance: float, longest_only: bool
+) -> NDArray[np.float64]:
+    """Return the rotation of each line towards a base line of its shape, radians, NaN without one.
+
+    Parameters
+    ----------
+    tolerance : float
+        Largest rotation, radians.
+    longest_only : bool
+        Whether the longest line of a shape is its only base, as printed; else a line that no base is near enough to
+        becomes the next one, because a shape often joins buildings and trees that stand at other angles.
+    """
     rotation = np.full(len(lines), np.nan)
-    base: dict[int, int] = {}
+    bases: dict[int, list[float]] = {}
     angles = np.arctan2(lines[:, UY], lines[:, UX])
     for i in by_length(lines):
-        reference = base.setdefault(int(shapes[i]), int(i))
-        turn = rotation_between(angles[i], angles[reference])
-        if abs(turn) <= tolerance:
-            rotation[i] = turn
+        directions = bases.setdefault(int(shapes[i]), [])
+        turns = [turn for base in directions if abs(turn := rotation_between(angles[i], base)) <= tolerance]
+        if turns:
+            rotation[i] = turns[0]
+        elif not directions or not longest_only:
+            directions.append(float(angles[i]))
+            rotation[i] = 0.0
     return rotation
 
 

@@ -108,7 +108,7 @@ def sample_curves(
     return Curves(sampled, sampled_offsets, shapes, closed, spacing)
 
 
-def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float) -> Curves:
+def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float, sample: float = SAMPLE) -> Curves:
     """Trace the closed outlines of the black shapes that are at least `shortest` metres long.
 
     Points lie at the centres of the black pixels along the border, so half a pixel inside the true edge. Travelling
@@ -129,7 +129,7 @@ def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float) -> Cu
             shapes.append(index if parent < 0 else parent)
     offsets = np.cumsum([0, *map(len, polylines)], dtype=np.int64)
     points = np.concatenate([np.empty((0, 2)), *polylines])
-    return sample_curves(points, offsets, np.array(shapes, dtype=np.int64), closed=True, spacing=SAMPLE / gsd)
+    return sample_curves(points, offsets, np.array(shapes, dtype=np.int64), closed=True, spacing=sample / gsd)
 
 
 @njit(cache=True)

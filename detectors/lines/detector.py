@@ -22,7 +22,7 @@ from ..base import Detector, Step
 from .adjustment import by_length
 from .boxes import OX, OY, Boxes, box_corners, lengths, prefix_sums
 from .colours import Colours
-from .contours import SAMPLE, trace_shapes
+from .contours import trace_shapes
 from .corners import find_corners
 from .extension import Cover, Growth, extend_lines
 from .final import FinalRules, final_rectangles
@@ -39,6 +39,8 @@ __all__ = ["PAPER_PIXEL", "LineDetector", "Rasters"]
 
 #: Ground sampling distance that the 2010 paper's pixel counts refer to, metres.
 PAPER_PIXEL = 0.15
+#: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
+_CURVE_STEP = 0.3
 #: Root mean square distance from its line at which a segment must have missed a corner, point spacings.
 _MISSED_CORNER = 0.8
 #: Threshold that no mean reaches: entropy is not used.
@@ -100,8 +102,13 @@ class LineDetector(Detector):
         source="2010, 3.3.1",
     )  # fmt: skip
     smoothing: float = parameter(
-        3.0, unit="px of 0.15 m", minimum=0, doc="sigma of the Gaussian along a curve", source="2010, 3.3.1"
+        3.0, unit="curve points", minimum=0, doc="sigma of the Gaussian along a curve", source="2010, 3.3.1"
     )
+    curve_step: float | None = parameter(
+        None, unit="m", minimum=0.01,
+        doc="distance of curve points; none: 0.3 point spacings, a third of a pixel or more",
+        source="2010, 3.3.1: pixels of 0.15 m at a spacing of 0.5 m; reading",
+    )  # fmt: skip
     corner_product: float = parameter(
         0.2, minimum=0, maximum=1, doc="least product of the three normalised accumulated chord distances",
         source="CPDA, 2009",
@@ -124,7 +131,7 @@ class LineDetector(Detector):
     )
     vegetation: str = parameter(
         "green-red", choices=("green-red", "pseudo-ndvi"),
-        doc="index on images without near infrared: (G-R)/(G+R), or the printed (R-G)/(R+G)",
+        doc="index on images without near infrared: 2(G-R)/(G+R), or the printed (R-G)/(R+G)",
         source="2010, 4.3; reading",
     )  # fmt: skip
     vegetation_threshold: float = parameter(
@@ -266,10 +273,10 @@ class LineDetector(Detector):
         """Return the lines around the black shapes, and their fates so far."""
         gsd = rasters.gsd
         black = rasters.masks.primary
-        curves = trace_shapes(black, shortest=self.minimum_side, gsd=gsd)
+        curves = trace_shapes(black, shortest=self.minimum_side, gsd=gsd, sample=self._sample(rasters))
         points, corners, offsets = find_corners(
             curves,
-            sigma=self.smoothing * PAPER_PIXEL / SAMPLE,
+            sigma=self.smoothing,
             product=self.corner_product,
             straight=(self.corner_angle, 360.0 - self.corner_angle),
         )
@@ -320,6 +327,11 @@ class LineDetector(Detector):
             rasters.colours, rasters.masks.primary, rasters.masks.secondary, rules, initial, longest_first
         )
         return initial, final_fates, final
+
+    def _sample(self, rasters: Rasters) -> float:
+        if self.curve_step is not None:
+            return self.curve_step
+        return max(_CURVE_STEP * rasters.spacing, rasters.gsd / 3)
 
     def _extended(self, rasters: Rasters, lines: Boxes) -> Boxes:
         extended: Boxes = extend_lines(rasters.cover, self._growth(rasters), lines, self.extension / rasters.gsd)

@@ -17,8 +17,7 @@ from ...scenes.parameters import parameter
 from ...scenes.raster import Image
 from .adjustment import adjust_to_neighbours, adjust_to_shape, rotate
 from .boxes import Boxes, lengths, prefix_sums
-from .contours import SAMPLE
-from .detector import PAPER_PIXEL, LineDetector, Rasters
+from .detector import LineDetector, Rasters
 from .entropy import grey_levels, local_entropy
 from .extension import band, mean_in_boxes
 from .image_edges import ImageEdges, extract_edges
@@ -42,7 +41,7 @@ class Improved(LineDetector):
         source="2011, 3.1; 2010, 3.2; conference version, 3.1",
     )  # fmt: skip
     entropy_threshold: float = parameter(
-        0.75, minimum=0, maximum=1, swept=(0.3, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85),
+        0.7, minimum=0, maximum=1, swept=(0.3, 0.6, 0.65, 0.7, 0.75, 0.8),
         doc="mean local entropy, as a share of the largest possible one, above which green is a tree; printed 0.3",
         source="2011, 3.2; reading",
     )  # fmt: skip
@@ -51,9 +50,10 @@ class Improved(LineDetector):
         doc="side of a line on which vegetation makes it a tree edge", source="2011, 3.2; 2010, 3.3.1",
     )  # fmt: skip
     adjustment: str = parameter(
-        "shape", choices=("shape", "neighbours", "none"),
-        doc="what lines are turned to: the longest line of their black shape, any line within 50 m, or nothing",
-        source="2011, 3.3",
+        "bases", choices=("bases", "longest", "neighbours", "none"),
+        doc="what lines are turned to: the longest line of their black shape, beyond its reach the next longest; the "
+        "longest alone, as printed; any line within 50 m; nothing",
+        source="2011, 3.3; reading",
     )  # fmt: skip
     adjustment_radius: float = parameter(
         50.0, unit="m", minimum=0, doc="largest distance of a line and its reference when turned to neighbours",
@@ -79,7 +79,11 @@ class Improved(LineDetector):
         source="2011, 3.4",
     )
     edge_contrast: float = parameter(
-        10.0, unit="grey levels", minimum=0, doc="least step in brightness that starts an image edge",
+        20.0, unit="grey levels", minimum=0, doc="least step in brightness that starts an image edge",
+        source="2011, 3.4; reading",
+    )  # fmt: skip
+    texture_margin: float = parameter(
+        1.0, unit="m", minimum=0, doc="how far outside a candidate image edges still count as its own",
         source="2011, 3.4; reading",
     )  # fmt: skip
     most_edges: float = parameter(
@@ -120,6 +124,7 @@ class Improved(LineDetector):
                 edges,
                 rasters.image.grid.shape,
                 gsd,
+                margin=self.texture_margin,
                 least=self.minimum_side,
                 most_edges=self.most_edges,
                 area_per_edge=self.area_per_edge,
@@ -165,8 +170,13 @@ class Improved(LineDetector):
     def _rotation(self, segments: Segments, alive: NDArray[np.bool_], gsd: float) -> NDArray[np.float64]:
         rotation = np.full(len(segments), np.nan)
         tolerance = np.radians(self.adjustment_angle)
-        if self.adjustment == "shape":
-            rotation[alive] = adjust_to_shape(segments.lines[alive], segments.shapes[alive], tolerance=tolerance)
+        if self.adjustment in ("bases", "longest"):
+            rotation[alive] = adjust_to_shape(
+                segments.lines[alive],
+                segments.shapes[alive],
+                tolerance=tolerance,
+                longest_only=self.adjustment == "longest",
+            )
         elif self.adjustment == "neighbours":
             rotation[alive] = adjust_to_neighbours(
                 segments.lines[alive], radius=self.adjustment_radius / gsd, tolerance=tolerance, longer_only=False
@@ -182,7 +192,7 @@ class Improved(LineDetector):
             blur=self.edge_blur,
             contrast=self.edge_contrast,
             shortest=self.minimum_side,
-            smoothing=self.smoothing * PAPER_PIXEL / SAMPLE,
+            smoothing=self.smoothing,
             product=self.corner_product,
             straight=(self.corner_angle, 360.0 - self.corner_angle),
         )

@@ -213,12 +213,18 @@ def judge(
     shape: tuple[int, int],
     gsd: float,
     *,
+    margin: float,
     least: float,
     most_edges: float,
     area_per_edge: float,
 ) -> Texture:
-    """Return the histograms and tests of candidate rectangles; see `apply_tests` for the limits."""
-    collective, strongest = histograms_of(boxes, edges.curves, edges.points, shape)
-    areas = lengths(boxes) * widths(boxes) * gsd**2
+    """Return the histograms and tests of candidate rectangles; see `apply_tests` for the limits.
+
+    Edges up to `margin` metres outside a rectangle count as its own: a final rectangle ends up to a strip inside the
+    edge of its roof, where the image has its strongest edge.
+    """
+    wide = boxes + np.array([0, 0, 0, 0, -1, 1, -1, 1]) * margin / gsd
+    collective, strongest = histograms_of(wide, edges.curves, edges.points, shape)
+    areas = lengths(wide) * widths(wide) * gsd**2
     limits = {"least": least, "most_edges": most_edges, "area_per_edge": area_per_edge}
     return Texture(edges, collective, strongest, apply_tests(collective, strongest, areas, **limits))

@@ -2,7 +2,9 @@
 
 With a near-infrared band the index is NDVI, 255 max(0, (NIR - R) / (NIR + R)). Without one there are two stand-ins: the
 paper's *pseudo-NDVI*, which takes red, green, blue for infrared, red, green and so is (R - G) / (R + G): high on red
-roofs, low on green leaves; and *green-red*, (G - R) / (G + R), which is high on green leaves.
+roofs, low on green leaves; and *green-red*, 2 (G - R) / (G + R), which is high on green leaves. Leaves differ far less
+between green and red than between infrared and red; the factor lets one threshold serve both (in images with all four
+bands the NDVI of leaves is two to four times their (G - R) / (G + R)).
 Source: Awrangjeb, Ravanbakhsh & Fraser (2010), sections 3.3.1 and 4.3.
 """
 
@@ -18,21 +20,21 @@ from ...scenes.raster import Image
 
 __all__ = ["vegetation_prefix"]
 
-#: Bands (plus, minus) of (plus - minus) / (plus + minus) on images without near infrared.
-_WITHOUT_NIR = {"green-red": ("green", "red"), "pseudo-ndvi": ("red", "green")}
+#: Bands and factor of factor * (plus - minus) / (plus + minus) on images without near infrared.
+_WITHOUT_NIR = {"green-red": ("green", "red", 2), "pseudo-ndvi": ("red", "green", 1)}
 
 
 @njit(cache=True)
-def _index_prefix(plus: NDArray[Any], minus: NDArray[Any]) -> NDArray[np.int32]:
+def _index_prefix(plus: NDArray[Any], minus: NDArray[Any], factor: int) -> NDArray[np.int32]:
     rows, columns = plus.shape
     prefix = np.empty((rows, columns + 1), dtype=np.int32)
     for row in range(rows):
-        total = np.int64(0)
+        total = 0
         prefix[row, 0] = 0
         for column in range(columns):
-            high, low = np.int64(plus[row, column]), np.int64(minus[row, column])
+            high, low = int(plus[row, column]), int(minus[row, column])
             if high > low:
-                total += (510 * (high - low) + high + low) // (2 * (high + low))
+                total += min((510 * factor * (high - low) + high + low) // (2 * (high + low)), 255)
             prefix[row, column + 1] = total
     return prefix
 
@@ -45,7 +47,7 @@ def vegetation_prefix(image: Image, without_nir: str) -> NDArray[np.int32]:
     without_nir : {"green-red", "pseudo-ndvi"}
         Index of an image that has no near-infrared band.
     """
-    plus, minus = ("nir", "red") if "nir" in image.bands else _WITHOUT_NIR[without_nir]
-    values = image.values
-    prefix: NDArray[np.int32] = _index_prefix(values[image.bands.index(plus)], values[image.bands.index(minus)])
+    plus, minus, factor = ("nir", "red", 1) if "nir" in image.bands else _WITHOUT_NIR[without_nir]
+    high, low = (image.values[image.bands.index(name)] for name in (plus, minus))
+    prefix: NDArray[np.int32] = _index_prefix(high, low, factor)
     return prefix

@@ -85,7 +85,7 @@ def test_nothing_in_the_scene_gives_an_empty_result():
     assert len(detect(Scene("empty", bare.extent, points=nothing, image=bare.image, dem=bare.dem))) == 0
 
 
-@pytest.mark.parametrize("choice", ["shape", "neighbours", "none"])
+@pytest.mark.parametrize("choice", ["bases", "longest", "neighbours", "none"])
 def test_every_kind_of_adjustment_finds_the_house(choice):
     scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 20)).build()
     assert len(detect(scene, adjustment=choice)) == 1

@@ -42,10 +42,17 @@ def test_longer_lines_are_turned_by_nothing_shorter():
 
 def test_lines_of_a_shape_are_turned_to_its_longest_and_odd_ones_drop_out():
     lines = np.array([line(0, 0, 10, 30), line(0, 9, 190, 90), line(5, 0, 104, 40), line(5, 5, 45, 50)])
-    rotation = np.degrees(adjust_to_shape(lines, np.array([7, 7, 7, 7]), tolerance=np.pi / 8))
+    one_shape = np.array([7, 7, 7, 7])
+    rotation = np.degrees(adjust_to_shape(lines, one_shape, tolerance=np.pi / 8, longest_only=True))
     np.testing.assert_allclose(rotation, [0, 0, -4, np.nan], atol=1e-9)
-    rotation = np.degrees(adjust_to_shape(lines, np.array([1, 2, 2, 3]), tolerance=np.pi / 8))
+    rotation = np.degrees(adjust_to_shape(lines, np.array([1, 2, 2, 3]), tolerance=np.pi / 8, longest_only=True))
     np.testing.assert_allclose(rotation, [0, 0, -4, 0], atol=1e-9)
+
+
+def test_lines_beyond_the_reach_of_the_longest_are_turned_to_the_next_longest():
+    lines = np.array([line(0, 0, 10, 90), line(0, 9, 45, 80), line(5, 0, 130, 40), line(5, 5, 97, 30)])
+    rotation = np.degrees(adjust_to_shape(lines, np.zeros(4, np.int64), tolerance=np.pi / 8, longest_only=False))
+    np.testing.assert_allclose(rotation, [0, 0, 5, 3], atol=1e-9)
 
 
 def test_rotating_turns_a_line_about_its_centre():
@@ -195,5 +202,5 @@ def test_a_strip_thinner_than_a_pixel_is_sampled_once_across():
 
 def test_directions_are_unit_vectors_after_all_steps():
     lines = np.array([line(0, 0, 10, 30), line(0, 9, 190, 90)])
-    turned = rotate(lines, adjust_to_shape(lines, np.zeros(2, np.int64), tolerance=1.0))
+    turned = rotate(lines, adjust_to_shape(lines, np.zeros(2, np.int64), tolerance=1.0, longest_only=True))
     np.testing.assert_allclose(np.hypot(turned[:, UX], turned[:, UY]), 1)
