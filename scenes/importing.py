@@ -286,7 +286,13 @@ def _decide_extent(
 
 
 def _paths(value: Sequence[_Path] | _Path) -> tuple[Path, ...]:
-    return (Path(value),) if isinstance(value, str | os.PathLike) else tuple(map(Path, value))
+    paths = (Path(value),) if isinstance(value, str | os.PathLike) else tuple(map(Path, value))
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise ParameterError(f"{path} is given twice: its points or pixels would count double")
+        seen.add(path.resolve())
+    return paths
 
 
 def _assumed(nameless: Sequence[Path], crs: str) -> str:

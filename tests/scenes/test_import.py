@@ -588,6 +588,8 @@ def test_an_area_of_another_place(files, refused):
         (["points.laz", "--extent", "0", "0", "9", "9"], "--extent covers x 0.0 to 9.0"),
         (["points.laz", "--ground-filter", "magic"], "--ground-filter must be opening or cloth, not 'magic'"),
         (["points.laz", "--dem", "dem.tif", "--ground-filter", "cloth"], "--dem or --ground-filter, not both"),
+        (["points.laz", "--points", "p*.laz"], "points.laz is given twice"),
+        (["ortho.tif", "--gsd", "0.01", "--extent", "0", "0", "9", "9"], "--extent covers"),
         (["reference.gpkg"], "reference.gpkg ends neither as a point file"),
     ],
 )
@@ -609,6 +611,14 @@ def test_a_header_with_wrong_bounds(files, refused):
     message = refused("wide.laz")
     assert "wide.laz: the header says x 0.0 to 500040.0" in message
     assert "give --extent 500000 5700000 500040 5700040" in message
+
+
+def test_a_stray_point_far_away(files, refused):
+    cloud = small_scenes.cloud()
+    cloud.x[0], cloud.y[0] = WEST + 80_000, SOUTH + 70_000
+    write_points(cloud, files / "stray.laz", crs=CRS)
+    message = refused("stray.laz")
+    assert "would have 70,000 x 80,000 cells of 1 m: cut it with --extent, or choose larger cells" in message
 
 
 # Windows and chunks
