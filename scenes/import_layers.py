@@ -19,7 +19,8 @@ from .footprints import Footprints
 from .las_files import LasHeader, read_points
 from .points import PointCloud
 from .raster import Elevation, Grid, Image
-from .raster_files import RasterHeader, mosaic_elevation, mosaic_image, resampling_note, warped_extent, warped_size
+from .raster_files import RasterHeader
+from .raster_mosaic import mosaic_elevation, mosaic_image, resampling_note, warped_extent, warped_size
 
 __all__ = [
     "Extent",

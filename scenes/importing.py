@@ -28,7 +28,8 @@ from .folder import open_scene, save_scene
 from .import_layers import Extent, ImportLog, Place
 from .las_files import LasHeader, read_las_header
 from .output import check_target
-from .raster_files import RasterHeader, band_names, read_raster_header, warped_extent
+from .raster_files import RasterHeader, band_names, read_raster_header
+from .raster_mosaic import warped_extent
 from .scene import Scene
 
 __all__ = ["import_scene"]

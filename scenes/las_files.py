@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .crs import crs_text, require_metric
+from .crs import crs_text, parse_crs, require_metric
 from .errors import CRSError, InputError
 from .points import PointCloud
 
@@ -179,8 +179,6 @@ def write_points(cloud: PointCloud, path: str | os.PathLike[str], *, crs: str | 
     if len(cloud):
         header.offsets = np.floor([cloud.x.min(), cloud.y.min(), cloud.z.min()])
     if crs is not None:
-        from .crs import parse_crs
-
         header.add_crs(parse_crs(crs))
     with laspy.open(os.fspath(path), mode="w", header=header) as writer:
         for start in range(0, len(cloud), CHUNK):

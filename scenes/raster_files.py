@@ -1,11 +1,11 @@
-"""GeoTIFF files: orthoimages and elevation models read by window or warped to a grid, and written.
+"""GeoTIFF files: orthoimages and elevation models read and written, and what is wrong with those of others.
 
 Nouns
 -----
 north up
     The affine transform has no rotation and rows run southwards; that is what `Grid` can hold.
-mosaic
-    Several files brought to one grid; where they overlap the first that has data wins.
+header
+    What a file says of itself, checked before anything is read.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .crs import crs_label, crs_text, same_crs
+from .crs import crs_text
 from .errors import CRSError, InputError
 from .raster import Elevation, Grid, Image
 
@@ -28,14 +28,11 @@ __all__ = [
     "BANDS",
     "RasterHeader",
     "band_names",
-    "mosaic_elevation",
-    "mosaic_image",
+    "opened",
     "read_elevation",
     "read_image",
     "read_raster_header",
-    "resampling_note",
-    "warped_extent",
-    "warped_size",
+    "require_image_type",
     "write_elevation",
     "write_image",
 ]
@@ -99,7 +96,7 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
         Units other than metres. A geographic CRS passes when it can be warped, which is for the caller to say.
     """
     file = Path(path)
-    with _opened(file) as source:
+    with opened(file) as source:
         if source.transform.is_identity and not source.crs:
             raise InputError(
                 f"{file} has no georeference: expected a GeoTIFF with an affine transform and a CRS; "
@@ -153,17 +150,18 @@ def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = No
     """
     header = _square(read_raster_header(path))
     names = band_names(header, bands)
-    with _opened(header.path) as source:
+    require_image_type(header)
+    with opened(header.path) as source:
         indexes, kept = _band_indexes(names)
         values = source.read(indexes)
         valid = _valid(source)
-    return Image(_as_image_type(header, values), kept, header.grid, valid)
+    return Image(values, kept, header.grid, valid)
 
 
 def read_elevation(path: str | os.PathLike[str]) -> Elevation:
     """Read an elevation model whole, on its own grid; cells without data are NaN."""
     header = _square(read_raster_header(path))
-    with _opened(header.path) as source:
+    with opened(header.path) as source:
         values = source.read(1, masked=True).astype(np.float32).filled(np.nan)
         values = values * np.float32(header.scale) + np.float32(header.offset)
     return Elevation(values, header.grid)
@@ -192,82 +190,6 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
             "name them with --bands, - to skip one"
         )
     return _DEFAULT_BANDS[header.band_count]
-
-
-def mosaic_image(headers: Sequence[RasterHeader], grid: Grid, *, crs: str, bands: Sequence[str] | None = None) -> Image:
-    """Bring one or several orthoimages to `grid` in `crs`; a file that names no CRS is taken to be in it.
-
-    Files whose cells coincide with those of `grid` are copied, others resampled: averaged when their cells are much
-    smaller, else bilinear.
-    """
-    named = [band_names(header, bands) for header in headers]
-    kept = tuple(name for name in named[0] if name != "-")
-    for header, names in zip(headers, named, strict=True):
-        if set(names) - {"-"} != set(kept):
-            raise InputError(
-                f"{header.path} has the bands {', '.join(names)} but {headers[0].path} {', '.join(kept)}: "
-                "images of one scene must have the same"
-            )
-        _as_image_type(header, np.empty(0, dtype=header.dtype))
-        if header.dtype != headers[0].dtype:
-            raise InputError(
-                f"{header.path} is {header.dtype} but {headers[0].path} {headers[0].dtype}: convert one of them, "
-                "for instance with gdal_translate -ot"
-            )
-    values = np.zeros((len(kept), *grid.shape), dtype=headers[0].dtype)
-    valid = np.zeros(grid.shape, dtype=bool)
-    for header, names in zip(headers, named, strict=True):
-        indexes = [names.index(name) + 1 for name in kept]
-        for rows, columns, block, has_data in _warped(header, indexes, grid, crs):
-            fresh = has_data & ~valid[rows, columns]
-            values[:, rows, columns][:, fresh] = block[:, fresh]
-            valid[rows, columns] |= fresh
-    return Image(values, kept, grid, None if valid.all() else valid)
-
-
-def mosaic_elevation(headers: Sequence[RasterHeader], grid: Grid, *, crs: str) -> Elevation:
-    """Bring one or several elevation models to `grid` in `crs`; cells without data are NaN."""
-    values = np.full(grid.shape, np.nan, dtype=np.float32)
-    for header in headers:
-        if header.band_count != 1:
-            raise InputError(f"{header.path} has {header.band_count} bands, expected an elevation model of one band")
-        if header.height_unit is not None:
-            raise CRSError(
-                f"{header.path}: its heights are in {header.height_unit}, metres are needed: convert them, for "
-                "instance with gdal_calc.py"
-            )
-        for rows, columns, block, has_data in _warped(header, [1], grid, crs):
-            fresh = has_data & np.isfinite(block[0]) & np.isnan(values[rows, columns])
-            values[rows, columns][fresh] = block[0][fresh] * header.scale + header.offset
-    return Elevation(values, grid)
-
-
-def warped_extent(header: RasterHeader, crs: str) -> tuple[float, float, float, float]:
-    """Return the extent of a raster, ``(xmin, ymin, xmax, ymax)``, in another CRS."""
-    if header.crs is None or same_crs(header.crs, crs):
-        return header.grid.extent
-    from rasterio.errors import RasterioError
-    from rasterio.warp import transform_bounds
-
-    try:
-        bounds: tuple[float, float, float, float] = transform_bounds(header.crs, crs, *header.grid.extent)
-    except RasterioError as error:
-        raise CRSError(
-            f"{header.path} cannot be transformed from {crs_label(header.crs)} to {crs_label(crs)}: "
-            "it is probably in another CRS than it names"
-        ) from error
-    return bounds
-
-
-def warped_size(header: RasterHeader, crs: str) -> float:
-    """Return the cell size in metres, to two digits, that keeps the detail of a raster in another CRS."""
-    if header.crs is None or same_crs(header.crs, crs):
-        return header.grid.gsd
-    from rasterio.warp import calculate_default_transform
-
-    grid = header.grid
-    transform, _, _ = calculate_default_transform(header.crs, crs, grid.columns, grid.rows, *grid.extent)
-    return float(f"{transform.a:.2g}")
 
 
 def write_image(image: Image, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
@@ -318,7 +240,7 @@ def _profile(grid: Grid, crs: str | None, count: int, dtype: str) -> dict[str, A
 
 
 @contextmanager
-def _opened(file: Path) -> Iterator[Any]:
+def opened(file: Path) -> Iterator[Any]:
     """Open a raster; what rasterio raises inside the block becomes one sentence."""
     import warnings
 
@@ -379,82 +301,16 @@ def _band_indexes(names: Sequence[str]) -> tuple[list[int], tuple[str, ...]]:
     return indexes, tuple(name for name in names if name != "-")
 
 
-def _as_image_type(header: RasterHeader, values: NDArray[Any]) -> NDArray[Any]:
-    if values.dtype not in (np.uint8, np.uint16):
+def require_image_type(header: RasterHeader) -> None:
+    """Raise `InputError` unless the values can be those of an orthoimage."""
+    if header.dtype not in ("uint8", "uint16"):
         raise InputError(
             f"{header.path} has {header.dtype} values, an orthoimage needs uint8 or uint16: convert it, for instance "
             "with gdal_translate -ot Byte -scale"
         )
-    return values
 
 
 def _valid(source: Any) -> NDArray[np.bool_] | None:
     """Return where the image has data; None when everywhere."""
     mask = source.dataset_mask() > 0
     return None if mask.all() else mask
-
-
-def _warped(
-    header: RasterHeader, indexes: list[int], grid: Grid, crs: str
-) -> Iterator[tuple[slice, slice, NDArray[Any], NDArray[np.bool_]]]:
-    """Yield (rows, columns, values, has data) of the part of `grid` that a file covers, by bands of rows."""
-    from rasterio import Affine
-    from rasterio.enums import Resampling
-    from rasterio.vrt import WarpedVRT
-
-    warp = header.crs is not None and not same_crs(header.crs, crs)
-    bounds = warped_extent(header, crs)
-    columns = _span(bounds[0], bounds[2], grid.west, grid.gsd, grid.columns)
-    rows = _span(-bounds[3], -bounds[1], -grid.north, grid.gsd, grid.rows)
-    if columns is None or rows is None:
-        return
-    with _opened(header.path) as source:
-        ratio = grid.gsd / header.grid.gsd
-        resampling = Resampling.average if ratio > 1.5 else Resampling.bilinear
-        if not warp and header.square and _same_cells(grid, header.grid):
-            resampling = Resampling.nearest
-        for start in range(rows.start, rows.stop, 1024):
-            stop = min(start + 1024, rows.stop)
-            corner = grid.to_world(start, columns.start)
-            with WarpedVRT(
-                source,
-                src_crs=header.crs if warp else crs,
-                crs=crs,
-                transform=Affine(grid.gsd, 0, float(corner[0]), 0, -grid.gsd, float(corner[1])),
-                width=columns.stop - columns.start,
-                height=stop - start,
-                resampling=resampling,
-                add_alpha=source.nodata is None and not _has_alpha(source),
-            ) as view:
-                block = view.read(indexes)
-                has_data = view.dataset_mask() > 0
-            yield slice(start, stop), columns, block, has_data
-
-
-def _has_alpha(source: Any) -> bool:
-    return any(colour.name == "alpha" for colour in source.colorinterp)
-
-
-def _span(low: float, high: float, origin: float, gsd: float, count: int) -> slice | None:
-    """Return the cells of one axis of a grid that a file's range meets, or None."""
-    first = max(0, int(np.floor((low - origin) / gsd + 1e-6)))
-    last = min(count, int(np.ceil((high - origin) / gsd - 1e-6)))
-    return slice(first, last) if last > first else None
-
-
-def _same_cells(one: Grid, two: Grid) -> bool:
-    """Return whether the cells of two grids coincide."""
-    shift = np.array([(one.west - two.west) / one.gsd, (one.north - two.north) / one.gsd])
-    return abs(one.gsd - two.gsd) <= 1e-6 * one.gsd and bool((abs(shift - np.round(shift)) < 1e-3).all())
-
-
-def resampling_note(header: RasterHeader, crs: str, grid: Grid) -> str | None:
-    """Return the sentence that tells how a file is brought to a scene's grid, or None when it is copied as it is."""
-    reasons = []
-    if header.crs is not None and not same_crs(header.crs, crs):
-        reasons.append(f"from {crs_label(header.crs)} to {crs_label(crs)}")
-    if not header.square or abs(header.grid.gsd - grid.gsd) > 1e-6 * grid.gsd:
-        reasons.append(f"to cells of {grid.gsd:g} m")
-    elif not reasons and not _same_cells(grid, header.grid):
-        reasons.append("by a fraction of a cell")
-    return f"{header.path.name} was resampled {' and '.join(reasons)}" if reasons else None

@@ -8,14 +8,13 @@ from rasterio.enums import ColorInterp
 import roofbench as rb
 from roofbench.scenes.errors import InputError
 from roofbench.scenes.raster_files import (
-    mosaic_elevation,
-    mosaic_image,
     read_elevation,
     read_image,
     read_raster_header,
     write_elevation,
     write_image,
 )
+from roofbench.scenes.raster_mosaic import mosaic_elevation, mosaic_image
 
 CRS, WEST, SOUTH = small_scenes.CRS, small_scenes.WEST, small_scenes.SOUTH
 NORTH_UP = Affine(0.5, 0, WEST, 0, -0.5, SOUTH + 40)
