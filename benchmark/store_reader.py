@@ -159,6 +159,31 @@ class StoreReader:
             point_count=row["point_count"],
         )
 
+    def scene_sizes(self) -> dict[int, tuple[int | None, float]]:
+        """Return the number of points (None where not known) and the hectares of every scene that was opened."""
+        rows = self._db.execute("SELECT id, point_count, extent FROM scenes WHERE extent IS NOT NULL")
+        sizes = {}
+        for row in rows:
+            xmin, ymin, xmax, ymax = json.loads(row["extent"])
+            sizes[int(row["id"])] = (row["point_count"], (xmax - xmin) * (ymax - ymin) / 1e4)
+        return sizes
+
+    def scene_hashes(self) -> dict[int, str | None]:
+        """Return the content hash of every scene; None where it was never opened."""
+        return {int(row[0]): row[1] for row in self._db.execute("SELECT id, content_hash FROM scenes")}
+
+    def commands(self) -> list[str]:
+        """Return the commands that asked for runs, in order."""
+        return [str(row[0]) for row in self._db.execute("SELECT command FROM plans ORDER BY id")]
+
+    def verdict_words(self, run_id: int, key: str) -> tuple[list[str], list[str]]:
+        """Return the verdict of each reference and of each detection, in the order of the objects."""
+        query = """SELECT side, verdict FROM verdicts JOIN evaluations ON evaluation_id = evaluations.id
+            WHERE run_id = ? AND key = ? ORDER BY side, position"""
+        rows = self._db.execute(query, (run_id, key)).fetchall()
+        sides = {side: [row[1] for row in rows if row[0] == side] for side in ("reference", "detection")}
+        return sides["reference"], sides["detection"]
+
     def scene_picture(self, scene_id: int) -> bytes | None:
         """Return the picture of a scene (WebP over its extent); None when it has none or was never opened."""
         row = self._db.execute("SELECT content FROM scene_pictures WHERE scene_id = ?", (scene_id,)).fetchone()

@@ -37,7 +37,17 @@ from .tasks import Outcome
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Axis", "BreakDown", "Point", "Sweep", "axis_of", "break_downs", "make_sweep", "run_sweep"]
+__all__ = [
+    "Axis",
+    "BreakDown",
+    "Point",
+    "Sweep",
+    "axis_of",
+    "break_downs",
+    "find_break_down",
+    "make_sweep",
+    "run_sweep",
+]
 
 _SCENE = "scene."
 
@@ -305,11 +315,11 @@ def break_downs(table: pd.DataFrame, axes: Sequence[Axis], index: Index, level: 
             places = [float(value) for value in line[axis.name]]
             margins = [sign * (float(value) - level) for value in line["mean"]]
             if places:
-                found.append(_break_down(places, margins, str(detector), axis.name, index.key, level))
+                found.append(find_break_down(places, margins, str(detector), axis.name, index.key, level))
     return found
 
 
-def _break_down(
+def find_break_down(
     places: list[float], margins: list[float], detector: str, axis: str, index: str, level: float
 ) -> BreakDown:
     """Return the first place where the margin falls below zero, by linear interpolation."""

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from ...scenes.errors import RoofbenchError
-from . import detect, evaluate, gate, run, runs, scenes, sweep
+from . import detect, evaluate, gate, plot, report, run, runs, scenes, sweep
 
 __all__ = ["app", "main"]
 
@@ -32,6 +32,8 @@ app.command("detect")(detect.detect)
 app.command("sweep")(sweep.sweep)
 app.add_typer(gate.baseline_app)
 app.command("gate")(gate.gate)
+app.command("report")(report.report)
+app.add_typer(plot.app)
 app.command("score")(runs.score)
 app.command("ls")(runs.ls)
 app.command("why")(runs.why)

@@ -55,7 +55,7 @@ def run(
     memory_limit: MemoryLimitOption = None,
     store: StoreOption = DEFAULT_STORE,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder for leaderboard.csv and leaderboard.md.")
+        Path | None, typer.Option("--output", "-o", help="Folder for report.html, leaderboard.csv and leaderboard.md.")
     ] = None,
     rank_by: Annotated[str | None, typer.Option(help="Index that ranks, for instance pixel.quality.")] = None,
     plugin: PluginOption = None,
@@ -75,8 +75,10 @@ def run(
     from ...reports.tables import print_incidents
     from ..leaderboard import incidents_of, make_leaderboard, rank_index
     from ..plan import make_plan, plan_content, suite_from_content
+    from ..report_data import fill_report
     from ..runner import Execution, run_plan
     from ..store import Store
+    from .report import write_report
 
     load_plugins(plugin)
     limits = read_limits(time_limit, memory_limit)
@@ -122,6 +124,10 @@ def run(
         print_incidents(incidents_of(result.rows), told)
         if output is not None:
             _write(output, boards)
+            if any(entry.scenes for board in boards for entry in board.entries):
+                judged = list(zip(plan.judges, boards, strict=True))
+                filled = fill_report(opened, result.rows, title=f"Suite {suite.name}", judged=judged)
+                write_report(filled, output / "report.html", overwrite=True)
         if result.failed:
             raise typer.Exit(3)
         if not any(entry.scenes for board in boards for entry in board.entries):

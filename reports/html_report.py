@@ -1,0 +1,342 @@
+"""The report as one HTML file: no network, a strict content security policy, everything that is data escaped.
+
+The page is a jinja2 template with autoescape; tables and charts stand in it as they are, maps are drawn by a script
+of our own from JSON in the page. Only that script may run: the policy names its hash.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module, resources
+from itertools import groupby
+from typing import Any
+
+import jinja2
+from markupsafe import Markup, escape
+
+from ..evaluators.base import Index
+from .charts import cost_figure, size_figure
+from .inline_svg import to_inline_svg
+from .overlay_json import report_json
+from .published import Comparison, checks
+from .report_data import Report
+from .sensitivity import sensitivity_figure
+from .tables import Cell, Entry, Leaderboard, format_cell
+
+__all__ = ["html_report"]
+
+_MOST_MATRIX_ROWS = 300
+#: Panels in one sensitivity figure.
+_MOST_AXES = 12
+_SYMBOL = re.compile(r"\b([A-Z])_([a-z]{1,2})\b")
+_GROUPS = {"object": "objects", "pixel": "area", "geometric": "geometry"}
+
+
+def html_report(report: Report, *, level: float = 0.8) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    report : Report
+    level : float
+        Quality that the break-down points of the sensitivity plots are about.
+    """
+    templates = resources.files(__package__) / "templates"
+    css, script, page = (
+        (templates / name).read_text("utf-8") for name in ("report.css", "report.js", "report.html.j2")
+    )
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    # Parsing turns line ends into \n; so does reading as text, hence the hash is of what the browser sees.
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return environment.from_string(page).render(
+        report=report,
+        css=Markup(css),  # noqa: S704 - our own file
+        script=Markup(script),  # noqa: S704 - our own file
+        script_hash=f"sha256-{digest}",
+        data=jinja2.utils.htmlsafe_json_dumps(report_json(report), separators=(",", ":"), allow_nan=False),
+        version=import_module(__package__.rpartition(".")[0]).__version__,
+        level=level,
+        cell_text=format_cell,
+        percent_text=_percent_text,
+        subscripted=_subscripted,
+        lead=_lead(report),
+        tiles=_tiles(report),
+        boards=[_board(board) for board in report.boards],
+        scene_groups=_scene_groups(report),
+        matrix=_matrix(report),
+        charts=_charts(report, level),
+        break_downs=[line.break_down for line in report.sensitivities if line.break_down],
+        published=_published(report),
+        incidents=report.boards[0].incidents if report.boards else (),
+        contents=_contents(report),
+    )
+
+
+@dataclass(frozen=True)
+class _Head:
+    """A column of a leaderboard: plain text, or an index with its unit and its name in words."""
+
+    text: str = ""
+    css: str = ""
+    index: Index | None = None
+    unit: str = ""
+    words: str = ""
+    meaning: str = ""
+    first: str = "ascending"
+    sorted: str = ""
+
+
+def _contents(report: Report) -> list[tuple[str, str]]:
+    there = [
+        ("leaderboard", "Leaderboard", True),
+        ("scenes", "Scenes", report.scenes),
+        ("worst", "Worst objects", report.errors),
+        ("by-scene", "Every scene", report.matrix),
+        ("size", "Building size", report.sizes),
+        ("sensitivity", "Sensitivity", report.sensitivities),
+        ("cost", "Time and memory", report.costs),
+        ("gate", "Gate", report.gate),
+        ("published", "Published", report.comparison),
+        ("incidents", "Failures", report.boards and report.boards[0].incidents),
+        ("provenance", "Provenance", True),
+    ]
+    return [(place, text) for place, text, shown in there if shown]
+
+
+def _lead(report: Report) -> str:
+    """Return the result in one or two sentences."""
+    if not report.boards:
+        return "Nothing was measured."
+    board = report.boards[0]
+    entries = _pooled(board)
+    ranked = [entry for entry in entries if entry.rank is not None]
+    if not ranked:
+        return f"{len(entries)} detectors, none of which has a result on every scene: nothing is ranked."
+    best, index = ranked[0], board.rank_by
+    text = f"{_short(best.label)} leads with {_with_unit(best.cells[index.key].value, index)} {index.title}"
+    cell = best.cells[index.key]
+    if cell.low is not None:
+        text += f" (95 % interval {format_cell(cell.low, index.unit)}–{format_cell(cell.high, index.unit)})"
+    text += f" over {_count(len(board.scenes), 'scene')} and {best.reference:,} reference footprints"
+    same = [_short(entry.label) for entry in ranked[1:] if set(entry.group) & set(best.group)]
+    if same:
+        return f"{text}; it cannot be told apart from {_listed(same)}."
+    rest = [f"{_short(entry.label)} {_with_unit(entry.cells[index.key].value, index)}" for entry in ranked[1:4]]
+    return f"{text}{', before ' + _listed(rest) if rest else ''}."
+
+
+def _tiles(report: Report) -> list[dict[str, Any]]:
+    if not report.boards:
+        return []
+    board = report.boards[0]
+    entries = _pooled(board)
+    failed = sum(entry.failed for entry in entries)
+    skipped = sum(entry.skipped for entry in entries)
+    runs = sum(entry.runs for entry in entries)
+    shown = [
+        (f"{len(entries)}", "detector" if len(entries) == 1 else "detectors"),
+        (f"{len(board.scenes):,}", "scene" if len(board.scenes) == 1 else "scenes"),
+        (f"{max((entry.reference for entry in entries), default=0):,}", "reference footprints"),
+        (f"{runs:,}", "runs"),
+    ]
+    tiles = [{"value": value, "text": text, "bad": False} for value, text in shown]
+    tiles.append({"value": f"{failed:,}", "text": f"failed, {skipped:,} skipped", "bad": failed > 0})
+    if report.gate is not None:
+        passed = report.gate.exit_code == 0
+        tiles.append({"value": "passed" if passed else "not passed", "text": "gate", "bad": not passed})
+    return tiles
+
+
+def _pooled(board: Leaderboard) -> list[Entry]:
+    return [entry for entry in board.entries if entry.pooling == "pooled"]
+
+
+def _board(board: Leaderboard) -> dict[str, Any]:
+    """Return a leaderboard as the template wants it."""
+    grouped = any(entry.group for entry in board.entries)
+    groups = [(name, len(list(members))) for name, members in groupby(_group_of(index) for index in board.indices)]
+    starts = {0}
+    for _, count in groups:
+        starts.add(max(starts) + count)
+    heads = [_Head("rank", "rank", sorted="ascending"), _Head("detector", "name")]
+    heads += [_Head("group", "left")] if grouped else []
+    heads += [_Head("scenes")]
+    css = []
+    for place, index in enumerate(board.indices):
+        css.append(" ".join(["start"] * (place in starts) + ["main"] * (index == board.rank_by)))
+        heads.append(
+            _Head(
+                css=css[-1],
+                index=index,
+                unit=_unit(index),
+                words=index.title,
+                meaning=f"{index.title}: {index.meaning} ({index.source}); better {index.better}",
+                first="descending" if index.better == "higher" else "ascending",
+            )
+        )
+    heads += [
+        _Head("objects", "start", first="descending"),
+        _Head("CPU s", meaning="median processor time of a run, seconds"),
+        _Head("MB", meaning="highest resident memory of all runs"),
+    ]
+    best = {(index.key, pooling): _best(board, index, pooling) for index in board.indices for pooling in _POOLINGS}
+    rows = [
+        {
+            "entry": entry,
+            "cells": [
+                {
+                    "index": index,
+                    "cell": entry.cells[index.key],
+                    "css": f"{css[place]} best".strip()
+                    if _same(entry.cells[index.key], best[index.key, entry.pooling])
+                    else css[place],
+                }
+                for place, index in enumerate(board.indices)
+            ],
+        }
+        for entry in board.entries
+    ]
+    return {
+        "evaluator": board.evaluator,
+        "leading": 3 + grouped,
+        "grouped": grouped,
+        "groups": groups,
+        "heads": heads,
+        "rows": rows,
+        "scenes": len(board.scenes),
+        "caption": board.caption(),
+        "notes": board.notes,
+    }
+
+
+_POOLINGS = ("pooled", "mean")
+
+
+def _best(board: Leaderboard, index: Index, pooling: str) -> float | None:
+    """Return the best value of an index among ranked entries; None where there is nothing to be better than."""
+    values = [
+        value
+        for entry in board.entries
+        if entry.pooling == pooling and entry.rank is not None and (value := entry.cells[index.key].value) is not None
+    ]
+    if index.better == "neither" or len(values) < 2:
+        return None
+    return max(values) if index.better == "higher" else min(values)
+
+
+def _same(cell: Cell, best: float | None) -> bool:
+    return best is not None and cell.value == best
+
+
+def _group_of(index: Index) -> str:
+    head = index.key.partition(".")[0]
+    return _GROUPS.get(head, head)
+
+
+def _unit(index: Index) -> str:
+    return {"fraction": " %", "ratio": "", "count": ""}.get(index.unit, f" {index.unit}")
+
+
+def _with_unit(value: float | None, index: Index) -> str:
+    return "no" if value is None else f"{format_cell(value, index.unit)}{_unit(index)}"
+
+
+def _percent_text(value: float | None, index: Index) -> str:
+    """Return our value in the units of the papers' tables: percent, and metres."""
+    if value is None:
+        return "–"
+    if index.unit in ("fraction", "ratio"):
+        return f"{100 * value:.1f}"
+    return f"{value:.2f} {index.unit}"
+
+
+def _subscripted(text: str) -> Markup:
+    """Return text, escaped, with symbols such as ``Q_l`` as they are printed."""
+    return Markup(_SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text))))  # noqa: S704 - escaped here
+
+
+def _short(label: str) -> str:
+    return label if len(label) <= 60 else f"{label[:40]}…"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}{'s' * (number != 1)}"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return " and ".join([*([", ".join(parts[:-1])] if len(parts) > 1 else []), parts[-1]])
+
+
+def _scene_groups(report: Report) -> list[tuple[str, list[tuple[int, str]]]]:
+    groups: dict[str, list[tuple[int, str]]] = {}
+    for place, view in enumerate(report.scenes):
+        groups.setdefault(_short(view.group), []).append((place, _short(view.name)))
+    return list(groups.items())
+
+
+def _matrix(report: Report) -> dict[str, Any] | None:
+    if not report.matrix or not report.boards:
+        return None
+    index = report.boards[0].rank_by
+    labels = [entry.label for entry in _pooled(report.boards[0])]
+    drawn = {view.name: place for place, view in enumerate(report.scenes)}
+    scenes = list(report.matrix)[:_MOST_MATRIX_ROWS]
+    return {
+        "index": index,
+        "unit": _unit(index),
+        "bars": index.unit == "fraction",
+        "labels": labels,
+        "rows": [
+            {
+                "scene": scene,
+                "place": drawn.get(scene),
+                "cells": [report.matrix[scene].get(label) for label in labels],
+            }
+            for scene in scenes
+        ],
+        "left_out": len(report.matrix) - len(scenes),
+    }
+
+
+def _published(report: Report) -> dict[str, Any] | None:
+    comparison: Comparison | None = report.comparison
+    if comparison is None or not report.boards:
+        return None
+    indices = [index for index in report.boards[0].indices if any(row.text(index.key) for row, _ in comparison.rows)]
+    return {
+        "indices": indices,
+        "rows": comparison.rows,
+        "checks": [(source, list(found)) for source, found in groupby(checks(), key=lambda check: check.source)],
+    }
+
+
+def _charts(report: Report, level: float) -> dict[str, Any]:
+    charts: dict[str, Any] = {"size": None, "cost": None, "gate": None, "sensitivity": []}
+    if report.sizes:
+        charts["size"] = _svg(size_figure(report.sizes), "size", "Completeness and correctness by footprint area")
+    if report.costs:
+        charts["cost"] = _svg(cost_figure(report.costs), "cost", "Time and memory against the size of the scene")
+    if report.gate is not None:
+        from .gate_figure import gate_figure
+
+        charts["gate"] = _svg(gate_figure(report.gate), "gate", "Paired differences of every index")
+    lines = report.sensitivities
+    for kind, name in ((True, "of the scenes"), (False, "of the detectors")):
+        names = list(dict.fromkeys(line.axis for line in lines if line.axis.startswith("scene.") == kind))
+        for start in range(0, len(names), _MOST_AXES):
+            some = [line for line in lines if line.axis in names[start : start + _MOST_AXES]]
+            figure = sensitivity_figure(some, level=level)
+            charts["sensitivity"].append(
+                _svg(figure, f"sensitivity{int(kind)}{start}", f"Quality along parameters {name}")
+            )
+    return charts
+
+
+def _svg(figure: Any, name: str, description: str) -> Markup:
+    return Markup(to_inline_svg(figure, name=name, description=description))  # noqa: S704 - escaped by matplotlib

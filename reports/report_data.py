@@ -1,0 +1,265 @@
+"""What a report draws: frozen data objects, filled by the benchmark from its store.
+
+Nouns
+-----
+overlay
+    The verdicts of one run on one scene: what a detector found, what it missed, and why.
+scene view
+    A scene with its picture, its reference and the overlays of the detectors that ran on it.
+error
+    An object that is wrong, measured by the area in m2 that is wrong about it.
+size bin
+    Objects of similar footprint area, with how many of them were right.
+cost
+    Time and memory of a detector on one scene.
+
+Coordinates are metres of the scene's CRS, x east and y north.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..evaluators.base import Index
+from .gate_text import GateResult
+from .published import Comparison
+from .scene_picture import ScenePicture
+from .tables import Leaderboard
+
+__all__ = [
+    "CostPoint",
+    "Error",
+    "Overlay",
+    "Provenance",
+    "Report",
+    "SceneView",
+    "Sensitivity",
+    "SensitivityPoint",
+    "Side",
+    "SizeBin",
+    "SizeCurve",
+]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Side:
+    """The verdicts of one side of an evaluation, one entry per object.
+
+    Attributes
+    ----------
+    verdicts : tuple of str
+        TP, MD, FP, FN or ``left out``.
+    reasons : tuple of str
+    partners : tuple of int or None
+        Id on the other side.
+    distances, overlaps, ious, rmses : ndarray, shape (n,)
+        Metres, m2, fraction, metres; NaN where undefined.
+    """
+
+    verdicts: tuple[str, ...]
+    reasons: tuple[str, ...]
+    partners: tuple[int | None, ...]
+    distances: NDArray[np.float64]
+    overlaps: NDArray[np.float64]
+    ious: NDArray[np.float64]
+    rmses: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Overlay:
+    """One run on one scene.
+
+    Attributes
+    ----------
+    label : str
+        Detector with changed parameters.
+    run, seed : int
+    polygons : ndarray of shapely polygons
+        Detections.
+    ids : tuple of int
+        Of the detections.
+    detections, references : Side
+    values : mapping of str to float or None
+        Index values by key.
+    """
+
+    label: str
+    run: int
+    seed: int
+    polygons: NDArray[np.object_]
+    ids: tuple[int, ...]
+    detections: Side
+    references: Side
+    values: Mapping[str, float | None]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SceneView:
+    """A scene with everything that is drawn over it; `picture` is None where none was stored."""
+
+    name: str
+    group: str
+    extent: tuple[float, float, float, float]
+    picture: ScenePicture | None
+    polygons: NDArray[np.object_]
+    ids: tuple[int, ...]
+    area: Any
+    overlays: tuple[Overlay, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Error:
+    """An object that is wrong.
+
+    Attributes
+    ----------
+    scene, overlay : int
+        Places in the report's scenes and in that scene's overlays.
+    side : {"detection", "reference"}
+    position : int
+        Row among the objects of its side.
+    wrong : float
+        Area that is wrong, m2: of a false alarm, a multiple detection or a missed reference its own; of a matched pair
+        what only one of the two covers.
+    """
+
+    scene: int
+    overlay: int
+    side: Literal["detection", "reference"]
+    position: int
+    wrong: float
+
+
+@dataclass(frozen=True)
+class SizeBin:
+    """Objects with an area from `low` to `high` m2: `right` of `count` were right."""
+
+    low: float
+    high: float
+    count: int
+    right: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class SizeCurve:
+    """How one detector does by size: references found (completeness), and detections that are right (correctness)."""
+
+    label: str
+    found: tuple[SizeBin, ...]
+    correct: tuple[SizeBin, ...]
+
+
+@dataclass(frozen=True)
+class SensitivityPoint:
+    """Mean over scenes of an index at one value of an axis, with its 95 % bootstrap interval where there is one."""
+
+    value: Any
+    mean: float | None
+    low: float | None
+    high: float | None
+    scenes: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensitivity:
+    """One line of a sensitivity plot.
+
+    Attributes
+    ----------
+    detector, axis : str
+        The axis is a parameter of the detector, or ``scene.NAME`` of the generator.
+    unit : str
+        Of the axis; empty when not known.
+    index : Index
+    points : tuple of SensitivityPoint
+        In the order of the axis.
+    default : Any
+        Value that the detector has when nothing is said; None for generator axes.
+    break_down : str
+        Where the index passes a level, in words; empty when it was not looked for.
+    place : float, optional
+        That value of the axis.
+    """
+
+    detector: str
+    axis: str
+    unit: str
+    index: Index
+    points: tuple[SensitivityPoint, ...]
+    default: Any = None
+    break_down: str = ""
+    place: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostPoint:
+    """One detector on one scene: medians over its runs; `points` is the size of the cloud, `hectares` of the extent."""
+
+    label: str
+    scene: str
+    points: int | None
+    hectares: float
+    cpu_seconds: float
+    peak_memory: int
+    runs: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Where the figures come from.
+
+    Attributes
+    ----------
+    facts : tuple of (str, str)
+        Name and value, in order: version, command, machine, packages, and so on.
+    scenes : tuple of (str, str, str)
+        Name, how it is made again, and content hash.
+    """
+
+    facts: tuple[tuple[str, str], ...]
+    scenes: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Report:
+    """Everything that one report shows; empty parts are left out of it.
+
+    Attributes
+    ----------
+    title : str
+    boards : tuple of Leaderboard
+        One per evaluator; the first one's verdicts are drawn.
+    matrix : mapping of str to mapping of str to float or None
+        Scene to detector to the value of the first board's ranking index (mean over seeds).
+    scenes : tuple of SceneView
+        Those that are drawn.
+    errors : tuple of Error
+        The worst objects.
+    sizes : tuple of SizeCurve
+    sensitivities : tuple of Sensitivity
+    costs : tuple of CostPoint
+    comparison : Comparison, optional
+        Published figures beside ours.
+    gate : GateResult, optional
+    provenance : Provenance
+    sampling : tuple of str
+        What was left out of the drawings, in words.
+    """
+
+    title: str
+    boards: tuple[Leaderboard, ...]
+    provenance: Provenance
+    matrix: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
+    scenes: tuple[SceneView, ...] = ()
+    errors: tuple[Error, ...] = ()
+    sizes: tuple[SizeCurve, ...] = ()
+    sensitivities: tuple[Sensitivity, ...] = ()
+    costs: tuple[CostPoint, ...] = ()
+    comparison: Comparison | None = None
+    gate: GateResult | None = None
+    sampling: tuple[str, ...] = ()

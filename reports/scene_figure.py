@@ -1,0 +1,107 @@
+"""One scene with the verdicts of several detectors, side by side, over its picture."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+from PIL import Image as Bitmap
+
+from .inline_svg import shortened
+from .report_data import Overlay, SceneView, Side
+from .scene_picture import ScenePicture
+from .verdict_map import VERDICT_STYLE, add_scale_bar, outlines
+
+__all__ = ["overlay_figure"]
+
+
+def overlay_figure(view: SceneView, *, window: tuple[float, float, float, float] | None = None) -> Figure:
+    """Return a panel per overlay, with the counts of each verdict.
+
+    Parameters
+    ----------
+    view : SceneView
+    window : tuple of float, optional
+        ``(xmin, ymin, xmax, ymax)`` to show, metres; the whole extent by default.
+    """
+    xmin, ymin, xmax, ymax = window or view.extent
+    count = len(view.overlays)
+    columns = min(3, count)
+    rows = math.ceil(count / columns)
+    width = {1: 8.0, 2: 6.0}.get(columns, 4.6)
+    shape = float(np.clip((ymax - ymin) / (xmax - xmin), 0.4, 2.0))
+    figure = Figure(figsize=(width * columns, rows * (width * shape + 0.5) + 0.7), dpi=110, layout="constrained")
+    figure.suptitle(shortened(view.name, 90), fontsize=11, parse_math=False)
+    backdrop = None if view.picture is None else _pale(view.picture)
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, overlay in zip(grid.flat, view.overlays, strict=False):
+        if backdrop is not None:
+            left, bottom, right, top = view.extent
+            axes.imshow(backdrop, extent=(left, right, bottom, top), interpolation="antialiased")
+        _draw(axes, view, overlay)
+        axes.set_xlim(xmin, xmax)
+        axes.set_ylim(ymin, ymax)
+        axes.set_aspect("equal")
+        add_scale_bar(axes)
+        counts = [f"{_count(overlay.detections, name)} {name}" for name in ("TP", "MD", "FP")]
+        counts.append(f"{_count(overlay.references, 'FN')} FN")
+        axes.set_title(f"{shortened(overlay.label)}: {', '.join(counts)}", fontsize=9, parse_math=False)
+    figure.legend(handles=_legend(view), loc="outside lower center", ncols=5, frameon=False, fontsize=9)
+    return figure
+
+
+def _pale(picture: ScenePicture) -> NDArray[np.float64]:
+    """Return the picture half way to white, so that colours over it are told apart."""
+    with Bitmap.open(io.BytesIO(picture.content)) as bitmap:
+        pixels = np.asarray(bitmap.convert("RGB"), dtype=np.float64) / 255
+    grey = pixels.mean(axis=-1, keepdims=True)
+    return np.asarray(0.35 + 0.65 * (0.5 * pixels + 0.5 * grey))
+
+
+def _draw(axes: Axes, view: SceneView, overlay: Overlay) -> None:
+    axes.add_collection(
+        PathCollection(list(outlines(view.polygons)), facecolor="none", edgecolor="black", linewidth=0.7)
+    )
+    sides: tuple[tuple[Side, Any, tuple[str, ...]], ...] = (
+        (overlay.references, view.polygons, ("FN",)),
+        (overlay.detections, overlay.polygons, ("TP", "MD", "FP")),
+    )
+    for side, polygons, shown in sides:
+        verdicts = np.array(side.verdicts, dtype=object)
+        for verdict in shown:
+            mine = polygons[verdicts == verdict]
+            colour, hatch, _ = VERDICT_STYLE[verdict]
+            face = to_rgba(colour, 0.3 if hatch else 0.5)
+            axes.add_collection(
+                PathCollection(list(outlines(mine)), facecolor=face, edgecolor=colour, hatch=hatch, linewidth=1.0)
+            )
+    if view.area is not None and shapely.area(view.area) > 0:
+        axes.add_collection(
+            PathCollection(list(outlines([view.area])), facecolor="none", edgecolor="#333333", linestyle="--")
+        )
+
+
+def _count(side: Side, verdict: str) -> int:
+    return sum(each == verdict for each in side.verdicts)
+
+
+def _legend(view: SceneView) -> Sequence[Patch]:
+    handles = [Patch(facecolor="none", edgecolor="black", label="reference")]
+    for name in ("TP", "MD", "FP", "FN"):
+        colour, hatch, label = VERDICT_STYLE[name]
+        handles.append(
+            Patch(facecolor=to_rgba(colour, 0.3 if hatch else 0.5), edgecolor=colour, hatch=hatch, label=label)
+        )
+    return handles

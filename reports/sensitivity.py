@@ -1,0 +1,152 @@
+"""Sensitivity plots: quality against a detector's parameters and against what makes scenes hard.
+
+After figure 8 of Awrangjeb, Ravanbakhsh & Fraser (2010), section 4.4.1, which plots object- and area-based quality
+against five values of five parameters, the others at their standard values. Here each axis has a panel of its own
+with the values themselves, the 95 % bootstrap interval of the mean over scenes, and the place where the mean falls
+below a level.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from .inline_svg import INK, SERIES, new_figure, shortened, style_axes
+from .report_data import Sensitivity
+
+__all__ = ["sensitivity_figure"]
+
+_DASHES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
+_COLUMNS = 3
+
+
+def sensitivity_figure(lines: Sequence[Sensitivity], *, level: float | None = None) -> Figure:
+    """Return a panel per axis: a colour per detector, a dash per index.
+
+    Parameters
+    ----------
+    lines : sequence of Sensitivity
+        In any order; at least one.
+    level : float, optional
+        Drawn dotted, when every index is a fraction.
+    """
+    axes_names = list(dict.fromkeys(line.axis for line in lines))
+    detectors = list(dict.fromkeys(line.detector for line in lines))
+    indices = list({line.index.key: line.index for line in lines}.values())
+    columns = min(_COLUMNS, len(axes_names))
+    rows = math.ceil(len(axes_names) / columns)
+    figure = new_figure(max(4.4, 3.25 * columns), 2.75 * rows + 0.35 * math.ceil((len(detectors) + len(indices)) / 4))
+    # One scale for all panels, so that what matters more looks steeper.
+    grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    percent = all(index.unit == "fraction" for index in indices)
+    factor = 100.0 if percent else 1.0
+    for panel in grid.flat[len(axes_names) :]:
+        panel.set_visible(False)
+    for panel, name in zip(grid.flat, axes_names, strict=False):
+        style_axes(panel)
+        mine = [line for line in lines if line.axis == name]
+        values, places = _places(mine)
+        for line in mine:
+            colour, marker = SERIES[detectors.index(line.detector) % len(SERIES)]
+            dash = _DASHES[[index.key for index in indices].index(line.index.key) % len(_DASHES)]
+            _draw_line(panel, line, places, colour=colour, marker=marker, dash=dash, factor=factor)
+        if level is not None and percent:
+            panel.axhline(100 * level, color=INK, linewidth=0.8, linestyle=":", alpha=0.7)
+        _label_axis(panel, name, mine, values, places)
+    units = " / ".join(dict.fromkeys(index.symbol or index.title for index in indices))
+    for row in grid:
+        row[0].set_ylabel(f"{units} [{'%' if percent else indices[0].unit}], mean over scenes")
+    _legend(figure, detectors, [index.title if len(index.title) > 9 else _named(index.key) for index in indices])
+    return figure
+
+
+def _named(key: str) -> str:
+    """Return an index key in words: ``object.quality`` becomes ``object quality``."""
+    return key.replace(".", " ").replace("_", " ")
+
+
+def _places(lines: Sequence[Sensitivity]) -> tuple[list[Any], dict[Any, float]]:
+    """Return the values of an axis in order, and where each is drawn: numbers to scale, others side by side."""
+    values = list({point.value: None for line in lines for point in line.points})
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        values.sort()
+        return values, {value: float(value) for value in values}
+    return values, {value: float(place) for place, value in enumerate(values)}
+
+
+def _draw_line(
+    panel: Axes, line: Sensitivity, places: dict[Any, float], *, colour: str, marker: str, dash: Any, factor: float
+) -> None:
+    known = [point for point in line.points if point.mean is not None]
+    x = [places[point.value] for point in known]
+    y = [factor * (point.mean or 0.0) for point in known]
+    spans = [
+        (places[p.value], factor * p.low, factor * p.high) for p in known if p.low is not None and p.high is not None
+    ]
+    if len(spans) > 1:
+        at, low, high = zip(*spans, strict=True)
+        panel.fill_between(at, low, high, color=colour, alpha=0.13, linewidth=0)
+    panel.plot(x, y, color=colour, linestyle=dash, linewidth=1.5, marker=marker, markersize=4.5)
+    if line.default in places and any(point.value == line.default for point in known):
+        here = next(point for point in known if point.value == line.default)
+        panel.plot(
+            places[here.value],
+            factor * (here.mean or 0.0),
+            marker="o",
+            markersize=10,
+            markerfacecolor="none",
+            markeredgecolor=INK,
+            markeredgewidth=1,
+        )
+    if line.place is not None:
+        panel.plot(
+            line.place,
+            0.0,
+            marker="v",
+            color=colour,
+            markersize=7,
+            transform=panel.get_xaxis_transform(),
+            clip_on=False,
+        )
+
+
+def _label_axis(
+    panel: Axes, name: str, lines: Sequence[Sensitivity], values: Sequence[Any], places: dict[Any, float]
+) -> None:
+    unit = next((line.unit for line in lines if line.unit), "")
+    counts = [point.scenes for line in lines for point in line.points]
+    n = f"{min(counts)}" if min(counts) == max(counts) else f"{min(counts)}–{max(counts)}"
+    title = name.removeprefix("scene.").replace("_", " ")
+    panel.set_xlabel(f"{shortened(title)}{f' [{unit}]' if unit else ''}; n = {n} scenes")
+    kind = "scene" if name.startswith("scene.") else "parameter"
+    panel.set_title(kind, loc="left", fontsize=10)
+    if len(values) <= 7:
+        panel.set_xticks([places[value] for value in values], [shortened(_shown(value), 14) for value in values])
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _legend(figure: Figure, detectors: Sequence[str], indices: Sequence[str]) -> None:
+    handles = [
+        Line2D([], [], color=colour, marker=marker, markersize=5, linewidth=1.5, label=shortened(name))
+        for name, (colour, marker) in zip(detectors, SERIES * (len(detectors) // len(SERIES) + 1), strict=False)
+    ]
+    handles += [
+        Line2D([], [], color=INK, linestyle=_DASHES[place % len(_DASHES)], linewidth=1.5, label=name)
+        for place, name in enumerate(indices)
+    ]
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=min(4, len(handles)),
+        frameon=False,
+        fontsize=9,
+        labelcolor=INK,
+    )
