@@ -98,7 +98,7 @@ class NDSM(Detector):
         0.1, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel say nothing: shadow"
     )
     smoothing: float = parameter(
-        0.5, unit="m", minimum=0, maximum=5, doc="sigma of the Gaussian over which the likeness to a tree is averaged"
+        0.75, unit="m", minimum=0, maximum=5, doc="sigma of the Gaussian over which the likeness to a tree is averaged"
     )
     opening: float = parameter(
         1.0, unit="m", minimum=0, maximum=10, doc="radius of the opening: narrower parts are cut off"
