@@ -39,6 +39,8 @@ __all__ = ["PAPER_PIXEL", "LineDetector", "Rasters"]
 
 #: Ground sampling distance that the 2010 paper's pixel counts refer to, metres.
 PAPER_PIXEL = 0.15
+#: The edge of a mask lies half a pixel outside the centres of its border pixels.
+_OUTSET = 0.5
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
 _CURVE_STEP = 0.3
 #: Root mean square distance from its line at which a segment must have missed a corner, point spacings.
@@ -282,10 +284,10 @@ class LineDetector(Detector):
         )
         missed = _MISSED_CORNER * rasters.spacing if self.missed_corner is None else self.missed_corner
         segments = fit_segments(
-            curves, points, corners, offsets, shortest=self.minimum_side / gsd, deviation=missed / gsd
+            curves, points, corners, offsets, shortest=self.minimum_side / gsd - 2 * _OUTSET, deviation=missed / gsd
         )
         reach = max(1.0, self.inside_reach * PAPER_PIXEL / gsd)
-        lines = inside_first(segments.lines, black, reach=reach, outset=0.5)
+        lines = inside_first(segments.lines, black, reach=reach, outset=_OUTSET)
         fates = np.full(len(lines), Fate.RECTANGLE, dtype=np.int64)
         fates[_beyond(lines, rasters.masks.coverage, reach)] = Fate.BORDER
         return Segments(lines, segments.shapes), fates

@@ -1,8 +1,9 @@
 """Segments: the straight pieces of curves between corners, as fitted lines.
 
 A *segment* is all curve points between two corners (of an open curve also between a corner and an end); its *line* is
-the total least-squares line through them, cut at the projections of the first and last point. Lines are boxes without
-width (see `boxes`), directed so that black lies across: the paper's inside point P_in is three pixels to that side.
+the total least-squares line through them, cut at the projections of the first and last point before smoothing. Lines
+are boxes without width (see `boxes`), directed so that black lies across: the inside point P_in of the paper is three
+pixels to that side.
 Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.1.
 """
 
@@ -45,8 +46,14 @@ class Segments:
 
 
 @njit(cache=True)
-def fit_line(points: NDArray[np.float64], first: int, count: int, start: int, n: int) -> NDArray[np.float64]:
-    """Fit a line to `count` points of the closed or open curve ``points[start:start + n]``, from index `first` on."""
+def fit_line(
+    points: NDArray[np.float64], ends: NDArray[np.float64], first: int, count: int, start: int, n: int
+) -> NDArray[np.float64]:
+    """Fit a line to `count` points of the closed or open curve ``points[start:start + n]``, from index `first` on.
+
+    `ends` is the same curve before smoothing, which pulls it away from its corners: the line is cut where its first and
+    last point project onto it.
+    """
     mx = my = 0.0
     for k in range(count):
         at = start + (first + k) % n
@@ -64,8 +71,8 @@ def fit_line(points: NDArray[np.float64], first: int, count: int, start: int, n:
     angle = 0.5 * math.atan2(2 * xy, xx - yy)
     ux, uy = math.cos(angle), math.sin(angle)
     a, b = start + first % n, start + (first + count - 1) % n
-    t0 = (points[a, 0] - mx) * ux + (points[a, 1] - my) * uy
-    t1 = (points[b, 0] - mx) * ux + (points[b, 1] - my) * uy
+    t0 = (ends[a, 0] - mx) * ux + (ends[a, 1] - my) * uy
+    t1 = (ends[b, 0] - mx) * ux + (ends[b, 1] - my) * uy
     if t1 < t0:
         ux, uy, t0, t1 = -ux, -uy, -t0, -t1
     middle, half = (t0 + t1) / 2, (t1 - t0) / 2
@@ -93,6 +100,7 @@ def _deviation(
 @njit(cache=True)
 def _fit_pieces(
     points: NDArray[np.float64],
+    ends: NDArray[np.float64],
     first: int,
     count: int,
     start: int,
@@ -107,7 +115,7 @@ def _fit_pieces(
         piece, length = waiting.pop()
         if length < 2:
             continue
-        line = fit_line(points, piece, length, start, n)
+        line = fit_line(points, ends, piece, length, start, n)
         off, farthest = _deviation(points, piece, length, start, n, line)
         if off > deviation and 0 < farthest < length - 1:
             waiting.append((piece + farthest, length - farthest))
@@ -119,6 +127,7 @@ def _fit_pieces(
 @njit(cache=True)
 def _fit_all(
     points: NDArray[np.float64],
+    raw: NDArray[np.float64],
     offsets: NDArray[np.int64],
     closed: bool,
     corners: NDArray[np.int64],
@@ -143,7 +152,7 @@ def _fit_all(
                 last = ends[j] if j < len(ends) else n - 1
                 count = last - first + 1
             before = len(lines)
-            _fit_pieces(points, first, count, start, n, shortest, deviation, lines)
+            _fit_pieces(points, raw, first, count, start, n, shortest, deviation, lines)
             for _ in range(len(lines) - before):
                 owner.append(i)
     packed = np.empty((len(lines), 8))
@@ -177,16 +186,18 @@ def fit_segments(
         A piece whose root mean square distance from its line is larger has a corner that was missed, and is split where
         it is farthest from the line, pixels.
     """
-    lines, owner = _fit_all(points, curves.offsets, curves.closed, corners, corner_offsets, shortest, deviation)
+    lines, owner = _fit_all(
+        points, curves.points, curves.offsets, curves.closed, corners, corner_offsets, shortest, deviation
+    )
     return Segments(lines, curves.shapes[owner])
 
 
 def inside_first(lines: Boxes, black: NDArray[np.uint8], *, reach: float, outset: float) -> Boxes:
-    """Turn lines whose black side is the other one, and move each `outset` pixels away from the black.
+    """Turn lines whose black side is the other one; move each `outset` pixels away from the black and both its ends.
 
     The black side is where the point `reach` pixels from the middle is black; where both points are alike, the
     direction of travel along the contour stands. Contour points are centres of black pixels, so the edge of the mask is
-    half a pixel further out.
+    half a pixel further out, at its corners in both directions.
     """
     rows, columns = black.shape
 
@@ -203,7 +214,7 @@ def inside_first(lines: Boxes, black: NDArray[np.uint8], *, reach: float, outset
     turned[wrong, UY] *= -1
     turned[:, OX] += outset * turned[:, UY]
     turned[:, OY] -= outset * turned[:, UX]
-    half = lengths(turned) / 2
+    half = lengths(turned) / 2 + outset
     turned[:, U0], turned[:, U1] = -half, half
     turned[:, V0] = turned[:, V1] = 0.0
     return turned

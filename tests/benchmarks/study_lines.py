@@ -1,0 +1,225 @@
+"""The studies behind docs/line-detectors.md: pattern of results, ablation, sensitivity, pictures.
+
+Run by hand: ``python tests/benchmarks/study_lines.py pattern|ablation|sensitivity|entropy|pictures [--seeds 1,2,3]``.
+
+Tables go to standard output as Markdown, pictures to docs/images. Scenes are made once and kept in the folder named by
+ROOFBENCH_BENCH_SCENES (default: bench-scenes). Figures are means over scenes and seeds of the percentages of each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+from pathlib import Path
+
+import numpy as np
+
+import roofbench as rb
+
+IMAGES = Path(__file__).parents[2] / "docs" / "images"
+FAIRFIELD = ("fairfield-1", "fairfield-2", "fairfield-3")
+AREAS = {"Fairfield 1-3": FAIRFIELD, "Moonee Ponds": ("moonee-ponds",), "Knox": ("knox",)}
+COLUMNS = ("C_m", "C_r", "Q_l", "M_d", "D_o", "C_rd", "C_rr", "C_mp", "C_rp", "Q_lp", "RMSE m")
+
+ABLATIONS = {
+    "original": (
+        "ground=point-dem",
+        "ground=tile-mode",
+        "vegetation=pseudo-ndvi",
+        "adjustment_reference=longer",
+        "missed_corner=1000",
+        "curve_step=0.15",
+        "inside_share=0.5",
+        "inside_share=1",
+        "inside_margin=0",
+        "extension_black=0.8",
+        "rise=0",
+        "compare=whole",
+    ),
+    "improved": (
+        "ground=tile-dem",
+        "entropy_threshold=0.3",
+        "vegetation_side=inside",
+        "adjustment=longest",
+        "adjustment=neighbours",
+        "adjustment=none",
+        "vote_length=printed",
+        "voting=false",
+        "texture=false",
+        "texture=false,voting=false",
+        "texture_margin=0",
+        "edge_contrast=0",
+        "missed_corner=1000",
+        "curve_step=0.15",
+        "inside_share=0.5",
+        "inside_margin=0",
+        "extension_black=0.8",
+        "rise=0",
+    ),
+}
+#: The five parameters of figure 8 and the values of section 4.4.1; the fourth to sixth standard value are marked there.
+SENSITIVITY = {
+    "tile_size": (400, 450, 500, 550, 600),
+    "black_share": (0.6, 0.7, 0.8, 0.9, 1.0),
+    "vegetation_threshold": (32, 40, 48, 56, 64),
+    "reduction": (0.10, 0.15, 0.20, 0.25, 0.30),
+    "colour_similarity": (0.2, 0.3, 0.4, 0.5, 0.6),
+}
+LABELS = {
+    "tile_size": "tile size (px of 0.15 m)",
+    "black_share": "black pixel threshold",
+    "vegetation_threshold": "vegetation threshold",
+    "reduction": "area reduction",
+    "colour_similarity": "colour similarity",
+}
+
+
+def scene_of(name, seed):
+    folder = Path(os.environ.get("ROOFBENCH_BENCH_SCENES", "bench-scenes"))
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}-{seed}"
+    if not path.exists():
+        rb.save_scene(rb.make_scene(name, seed=seed), path)
+    return rb.open_scene(path)
+
+
+def indices(scene, selection):
+    """Return the percentages of COLUMNS of one detector on one scene."""
+    found = rb.make_detector(selection).detect(scene.for_detection(), np.random.default_rng(0))
+    result = rb.make_evaluator("threshold-free").evaluate(found, scene.reference)
+    by_object, pixel = result.object, result.pixel
+    shares = (
+        by_object.completeness, by_object.correctness, by_object.quality, by_object.multiple_detection_rate,
+        by_object.detection_overlap_rate, by_object.detection_cross_lap_rate, by_object.reference_cross_lap_rate,
+        pixel.completeness, pixel.correctness, pixel.quality,
+    )  # fmt: skip
+    return [None if share is None else 100 * share for share in shares] + [result.geometric.rmse]
+
+
+def means(rows):
+    columns = ([value for value in column if value is not None] for column in zip(*rows, strict=True))
+    return [statistics.fmean(column) if column else float("nan") for column in columns]
+
+
+def pattern(seeds):
+    print("| detector, area | " + " | ".join(COLUMNS) + " |")
+    print("|---" * (len(COLUMNS) + 1) + "|")
+    for area, names in AREAS.items():
+        scenes = [scene_of(name, seed) for name in names for seed in seeds]
+        for detector in ("original", "original[ground=point-dem]", "improved"):
+            row = means([indices(scene, detector) for scene in scenes])
+            print(f"| {detector}, {area} | " + " | ".join(f"{value:.1f}" for value in row) + " |", flush=True)
+
+
+def ablation(seeds, detectors):
+    chosen = {area: [scene_of(name, seed) for name in names for seed in seeds] for area, names in AREAS.items()}
+    heads = " | ".join(f"{area} Q_l | Q_lp" for area in AREAS)
+    for detector in detectors:
+        print(f"| {detector} | {heads} |")
+        print("|---" * (2 * len(AREAS) + 1) + "|")
+        base = None
+        for change in ("", *ABLATIONS[detector]):
+            values = []
+            for scenes in chosen.values():
+                row = means([indices(scene, f"{detector}[{change}]") for scene in scenes])
+                values += [row[2], row[9]]
+            if base is None:
+                base, text = values, [f"{value:.1f}" for value in values]
+            else:
+                text = [f"{value - before:+.1f}" for value, before in zip(values, base, strict=True)]
+            print(f"| {f'`{change}`' if change else 'as it is'} | " + " | ".join(text) + " |", flush=True)
+
+
+def sensitivity(seeds):
+    from matplotlib.figure import Figure
+
+    scenes = [scene_of(name, seed) for name in FAIRFIELD for seed in seeds]
+    print("| parameter | value | Q_l | Q_lp |\n|---|---|---|---|")
+    figure = Figure(figsize=(11, 3.6))
+    panels = figure.subplots(1, 2, sharex=True)
+    for parameter, values in SENSITIVITY.items():
+        rows = [means([indices(scene, f"original[{parameter}={value}]") for scene in scenes]) for value in values]
+        default = rb.make_detector("original").values()[parameter]
+        for value, row in zip(values, rows, strict=True):
+            mark = " (standard)" if value == default else ""
+            print(f"| {LABELS[parameter]} | {value:g}{mark} | {row[2]:.1f} | {row[9]:.1f} |", flush=True)
+        for panel, column in zip(panels, (2, 9), strict=True):
+            panel.plot(range(1, 6), [row[column] for row in rows], marker="o", label=LABELS[parameter])
+    for panel, title in zip(panels, ("object quality Q_l, %", "pixel quality Q_lp, %"), strict=True):
+        panel.set_title(title, fontsize=10)
+        panel.set_xlabel("number of the value (1 to 5)")
+        panel.set_xticks(range(1, 6))
+        panel.grid(alpha=0.3)
+    panels[1].legend(fontsize=8, loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
+    save(figure, "lines-sensitivity.png")
+
+
+def entropy(seeds):
+    scenes = {area: [scene_of(name, seed) for name in names for seed in seeds] for area, names in AREAS.items()}
+    print("| entropy_threshold | " + " | ".join(f"{area} Q_l | Q_lp" for area in scenes) + " |")
+    print("|---" * (2 * len(scenes) + 1) + "|")
+    for value in (0.3, 0.6, 0.65, 0.7, 0.75, 0.8):
+        text = []
+        for members in scenes.values():
+            row = means([indices(scene, f"improved[entropy_threshold={value}]") for scene in members])
+            text += [f"{row[2]:.1f}", f"{row[9]:.1f}"]
+        print(f"| {value:g} | " + " | ".join(text) + " |", flush=True)
+
+
+def save(figure, name):
+    import cv2
+
+    IMAGES.mkdir(parents=True, exist_ok=True)
+    figure.savefig(IMAGES / name, dpi=90, bbox_inches="tight")
+    pixels = cv2.imread(str(IMAGES / name))
+    for colours in (256, 128, 64, 32):
+        if (IMAGES / name).stat().st_size < 290_000:
+            break
+        from PIL import Image as Picture
+
+        Picture.fromarray(pixels[..., ::-1]).quantize(colours).save(IMAGES / name, optimize=True)
+
+
+def crop(scene, share):
+    """Return the part of a scene around its centre, `share` of its width and height."""
+    xmin, ymin, xmax, ymax = scene.extent
+    x, y = (xmin + xmax) / 2, (ymin + ymax) / 2
+    half = share * (xmax - xmin) / 2, share * (ymax - ymin) / 2
+    grid = scene.image.grid
+    top, bottom = (round((grid.north - value) / grid.gsd) for value in (y + half[1], y - half[1]))
+    left, right = (round((value - grid.west) / grid.gsd) for value in (x - half[0], x + half[0]))
+    part = rb.Grid(grid.west + left * grid.gsd, grid.north - top * grid.gsd, grid.gsd, bottom - top, right - left)
+    image = rb.Image(scene.image.values[:, top:bottom, left:right].copy(), scene.image.bands, part)
+    cloud = scene.points
+    xmin, ymin, xmax, ymax = part.extent
+    inside = (cloud.x >= xmin) & (cloud.x <= xmax) & (cloud.y >= ymin) & (cloud.y <= ymax)
+    return rb.Scene("part", part.extent, crs=scene.crs, points=cloud.take(inside), image=image, dem=scene.dem)
+
+
+def pictures(_seeds):
+    from matplotlib.figure import Figure
+
+    for detector, name, share in (("original", "fairfield-1", 0.5), ("improved", "knox", 0.35)):
+        scene = crop(scene_of(name, 1), share)
+        for step in rb.make_detector(detector).steps(scene, np.random.default_rng(0)):
+            figure = Figure()
+            step.draw(figure)
+            save(figure, f"lines-{detector}-{step.name}.png")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("study", choices=("pattern", "ablation", "sensitivity", "entropy", "pictures"))
+    parser.add_argument("--seeds", default="1,2,3")
+    parser.add_argument("--detectors", default="original,improved")
+    options = parser.parse_args()
+    seeds = [int(seed) for seed in options.seeds.split(",")]
+    if options.study == "ablation":
+        ablation(seeds, options.detectors.split(","))
+    else:
+        {"pattern": pattern, "sensitivity": sensitivity, "entropy": entropy, "pictures": pictures}[options.study](seeds)
+
+
+if __name__ == "__main__":
+    main()
