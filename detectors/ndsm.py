@@ -133,6 +133,7 @@ class NDSM(Detector):
 
     def work(self, scene: Scene) -> Work:
         """Detect, and return every intermediate result."""
+        scene.require(self.requires)
         scene = scene.for_detection()
         points = scene.points
         assert points is not None

@@ -5,6 +5,7 @@ from shapely.affinity import rotate, translate
 
 from roofbench.detectors.ndsm import NDSM
 from roofbench.detectors.registry import make_detector
+from roofbench.scenes.errors import MissingInputError
 from roofbench.scenes.points import PointCloud
 from roofbench.scenes.raster import Elevation, Grid, Image
 from roofbench.scenes.scene import Scene
@@ -132,6 +133,11 @@ def test_hardly_any_points_give_no_footprints(n):
     place = Place()
     few = PointCloud(place.x[:n], place.y[:n], place.z[:n])
     assert len(NDSM().detect(Scene("few", EXTENT, points=few), RNG)) == 0
+
+
+def test_a_scene_without_points_is_refused_in_one_sentence():
+    with pytest.raises(MissingInputError, match="has not a point cloud"):
+        NDSM().detect(Scene("blind", EXTENT), RNG)
 
 
 def test_no_building_gives_no_footprints():
