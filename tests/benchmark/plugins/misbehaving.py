@@ -29,8 +29,7 @@ class Misbehaving(rb.Detector):
             getattr(self, f"_{self.mode}")(scene)
             if self.mode == "nonsense":
                 return "nonsense"
-        if self.seconds:
-            time.sleep(self.seconds)
+        time.sleep(self.seconds or float(os.environ.get("MISBEHAVING_SECONDS", "0")))
         x, y = np.meshgrid(np.arange(12, 120, 24.0), np.arange(12, 120, 24.0))
         centres = np.stack([x.ravel(), y.ravel()], -1) + scene.extent[:2] + rng.normal(0, 0.5, (25, 2))
         if self.only_on in scene.name and self.mode == "far":
