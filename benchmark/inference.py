@@ -16,6 +16,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,10 +37,13 @@ _RESAMPLES = 4000
 _MOST_ENUMERATED = 16  # 2^16 sign patterns; beyond, Wilcoxon's signed-rank test
 
 
+@lru_cache(maxsize=64)
 def resampling_weights(count: int, resamples: int = _RESAMPLES) -> NDArray[np.int64]:
     """Return how often each of `count` scenes is drawn in each resample, shape (resamples, count)."""
     rng = np.random.default_rng(np.random.SeedSequence([count, resamples]))
-    return rng.multinomial(count, np.full(count, 1 / count), size=resamples)
+    weights = rng.multinomial(count, np.full(count, 1 / count), size=resamples)
+    weights.flags.writeable = False  # shared by all callers
+    return weights
 
 
 def expanded_level(count: int, level: float = LEVEL) -> float:
@@ -47,9 +51,9 @@ def expanded_level(count: int, level: float = LEVEL) -> float:
 
     Plain percentiles are too narrow for few values; for many, this tends to ``level / 2``.
     """
-    from scipy import stats
+    from scipy import special  # the whole of scipy.stats takes a second to import
 
-    return float(stats.norm.cdf(-math.sqrt(count / (count - 1)) * stats.t.ppf(1 - level / 2, count - 1)))
+    return float(special.ndtr(-math.sqrt(count / (count - 1)) * special.stdtrit(count - 1, 1 - level / 2)))
 
 
 def bootstrap_interval(values: ArrayLike, *, level: float = LEVEL) -> tuple[float, float] | None:

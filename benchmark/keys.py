@@ -90,6 +90,7 @@ def source_closure(plugin: type[Any]) -> SourceClosure:
     return SourceClosure(dict(sorted(modules.items())), packages)
 
 
+@lru_cache(maxsize=16)
 def module_closure(module: str) -> SourceClosure:
     """Return the source closure of a module of roofbench, such as ``scenes.synthetic``."""
     modules: dict[str, str] = {}

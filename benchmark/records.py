@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import shapely
 
@@ -67,9 +67,8 @@ class RunIdentity:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunRow:
-    """One stored run, without its detections."""
+class RunRow(NamedTuple):
+    """One stored run, without its detections; a tuple, because a listing makes very many of them."""
 
     id: int
     key: str

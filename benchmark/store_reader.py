@@ -97,17 +97,20 @@ class StoreReader:
                 values.append(wanted)
         where = " AND ".join(conditions)
         query = f"{_SELECT_RUNS} WHERE {where} ORDER BY runs.id DESC LIMIT ?"
-        rows = self._db.execute(query, (*values, -1 if limit is None else limit))
-        return [_run_row(row) for row in rows]
+        return self._run_rows(query, (*values, -1 if limit is None else limit))
+
+    def _run_rows(self, query: str, values: Sequence[Any]) -> list[RunRow]:
+        cursor = self._db.cursor()
+        cursor.row_factory = None  # plain tuples, in the order of the fields
+        return [RunRow._make(row) for row in cursor.execute(query, values)]
 
     def runs_of(self, keys: Sequence[str]) -> dict[str, RunRow]:
         """Return the stored runs of these keys, by key."""
-        found = {}
+        found: dict[str, RunRow] = {}
         for some in _chunks(list(keys)):
             marks = ",".join("?" * len(some))
             query = f"{_SELECT_RUNS} WHERE runs.key IN ({marks})"
-            for row in self._db.execute(query, some):
-                found[str(row["key"])] = _run_row(row)
+            found.update((row.key, row) for row in self._run_rows(query, some))
         return found
 
     def run(self, name: str | int) -> RunRow:
@@ -116,15 +119,15 @@ class StoreReader:
         query = f"{_SELECT_RUNS} WHERE "
         rows = []
         if text.isdecimal():
-            rows = self._db.execute(query + "runs.id = ?", (int(text),)).fetchall()
+            rows = self._run_rows(query + "runs.id = ?", (int(text),))
         if not rows and len(text) >= 4 and text.isalnum():
-            rows = self._db.execute(query + "runs.key GLOB ? LIMIT 2", (text + "*",)).fetchall()
+            rows = self._run_rows(query + "runs.key GLOB ? LIMIT 2", (text + "*",))
         if len(rows) != 1:
             found = "several runs" if rows else "no run"
             raise UnknownNameError(
                 f"{self.path} has {found} called {text!r}: 'roofbench ls' shows their numbers and keys"
             )
-        return _run_row(rows[0])
+        return rows[0]
 
     def scene(self, scene_id: int) -> StoredScene:
         """Return a scene with its reference."""
@@ -279,10 +282,6 @@ class StoreReader:
         row = self._db.execute("SELECT metadata FROM runs WHERE id = ?", (run_id,)).fetchone()
         facts: Mapping[str, Any] = json.loads(row["metadata"])
         return facts
-
-
-def _run_row(row: sqlite3.Row) -> RunRow:
-    return RunRow(**dict(row))
 
 
 def _chunks(items: list[str], size: int = 500) -> Iterator[list[str]]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -122,10 +122,9 @@ class Score:
         given = evaluation.verdicts
         if given is not None:
             for side, frame in (("detection", given.detections), ("reference", given.references)):
-                plain = frame.drop(columns="geometry", errors="ignore")
-                verdicts[side] = [
-                    {str(name): _plain(value) for name, value in row.items()} for row in plain.to_dict("records")
-                ]
+                names = [str(name) for name in frame.columns if name != "geometry"]
+                columns = [[_plain(value) for value in frame[name].tolist()] for name in names]
+                verdicts[side] = [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
         return cls(
             evaluator=recipe,
             code=code,
@@ -141,7 +140,7 @@ def _plain(value: Any) -> Any:
     """Return a Python number, text or None of what a DataFrame or an evaluation holds; not-a-number becomes None."""
     if isinstance(value, np.generic):
         value = value.item()
-    if value is None or value != value or type(value).__name__ == "NAType":
+    if value is None or type(value).__name__ == "NAType" or value != value:
         return None
     return value if isinstance(value, bool | int | float | str) else str(value)
 
@@ -203,10 +202,13 @@ class Outcome:
 
     def to_bytes(self) -> bytes:
         """Return a JSON header followed by the geometries."""
-        header = asdict(self)
+        header = _fields(self)
+        header["cost"] = _fields(self.cost)
+        header["scores"] = [{**_fields(score), "evaluator": score.evaluator.to_dict()} for score in self.scores]
         blobs = [*self.detections]
         header["detections"] = len(self.detections)
         if self.scene is not None:
+            header["scene"] = _fields(self.scene)
             reference = self.scene.reference
             blobs += [*(reference or ()), self.scene.area or b"", self.scene.picture or b""]
             header["scene"]["reference"] = None if reference is None else len(reference)
@@ -240,6 +242,11 @@ class Outcome:
                 record[name] = None if record[name] is None else tuple(record[name])
             header["scene"] = SceneRecord(**record)
         return cls(**header)
+
+
+def _fields(record: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass by name, without going deeper as `dataclasses.asdict` does."""
+    return {field.name: getattr(record, field.name) for field in fields(record)}
 
 
 def footprints_of(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import gc
 import os
 import platform
 import time
@@ -78,7 +77,6 @@ def execute(
         if lacking:
             return Outcome(status="skipped", reason=lacking, scene=record, machine=machine_facts())
         _read(visible)
-        gc.collect()
         _reset_peak_memory()
         started = time.perf_counter(), time.process_time()
         detected = detect(scene, detector, seed=task.seed)

@@ -13,6 +13,7 @@ import importlib.util
 import re
 import sys
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -138,7 +139,7 @@ class Registry:
         ]
 
     def _entry_points(self) -> dict[str, importlib.metadata.EntryPoint]:
-        return {entry.name: entry for entry in importlib.metadata.entry_points(group=self._group)}
+        return _installed(self._group)
 
     def _checked(self, plugin: Any, name: str) -> type[Any]:
         if not (isinstance(plugin, type) and issubclass(plugin, self._base)):
@@ -146,6 +147,12 @@ class Registry:
         if not isinstance(getattr(plugin, "name", None), str):
             raise ParameterError(f"{name} has no name: set the class attribute 'name'")
         return plugin
+
+
+@cache
+def _installed(group: str) -> dict[str, importlib.metadata.EntryPoint]:
+    """Return the entry points of a group; the search reads a file of every installed package, so it is done once."""
+    return {entry.name: entry for entry in importlib.metadata.entry_points(group=group)}
 
 
 def _origin(plugin: type[Any]) -> tuple[str, str]:

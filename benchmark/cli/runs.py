@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -35,7 +34,7 @@ def ls(
         rows = opened.runs(status=status, detector=detector, scene=scene, limit=limit or None)
         total = opened.count_runs() if form == "table" else 0
     if form == "json":
-        plain = [{name: value for name, value in asdict(row).items() if not name.endswith("_text")} for row in rows]
+        plain = [{name: value for name, value in row._asdict().items() if not name.endswith("_text")} for row in rows]
         typer.echo(json.dumps(plain, indent=2))
         return
     if form == "csv":

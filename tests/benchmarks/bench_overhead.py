@@ -1,0 +1,79 @@
+"""Measure what the framework adds to the detectors' time: ``python tests/benchmarks/bench_overhead.py [SECONDS]``.
+
+A sweep of 5 parameters x 5 values x 10 scenes (250 runs) on two workers with a detector that computes for so many
+seconds (0.5). Counted in processor time, so that other work on the machine does not matter: everything that this
+process and its workers use beyond the detections, start of the workers, opening of the scenes and evaluation included.
+"""
+
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from roofbench.benchmark.recipes import SceneRecipe
+from roofbench.benchmark.runner import Execution
+from roofbench.benchmark.store import Store
+from roofbench.benchmark.suite import Entrant, Suite
+from roofbench.benchmark.sweep import axis_of, make_sweep, run_sweep
+from roofbench.detectors.registry import make_detector
+from roofbench.evaluators.registry import make_evaluator
+
+DETECTOR = '''
+import time
+from dataclasses import dataclass
+import numpy as np
+import roofbench as rb
+
+@dataclass(frozen=True, kw_only=True)
+class Busy(rb.Detector):
+    """Computes for some seconds and finds squares on a lattice."""
+
+    name = "busy"
+    seconds: float = rb.parameter(0.5)
+    a: int = rb.parameter(0)
+    b: int = rb.parameter(0)
+    c: int = rb.parameter(0)
+    d: int = rb.parameter(0)
+    e: int = rb.parameter(0)
+
+    def detect(self, scene, rng):
+        end = time.process_time() + self.seconds
+        while time.process_time() < end:
+            sum(range(1000))
+        x, y = np.meshgrid(np.arange(12, 120, 24.0), np.arange(12, 120, 24.0))
+        centres = np.stack([x.ravel(), y.ravel()], -1) + scene.extent[:2]
+        return rb.Footprints.from_rectangles(centres[:, None] + np.array([(-4, -4), (4, -4), (4, 4), (-4, 4)]))
+'''
+
+
+def cpu_seconds():
+    return sum(
+        usage.ru_utime + usage.ru_stime
+        for usage in (resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN))
+    )
+
+
+def main():
+    seconds = sys.argv[1] if len(sys.argv) > 1 else "0.5"
+    with tempfile.TemporaryDirectory() as folder:
+        plugin = Path(folder) / "busy.py"
+        plugin.write_text(DETECTOR)
+        detector = make_detector(f"{plugin}:Busy", {"seconds": seconds})
+        scenes = tuple(SceneRecipe.of_preset("hamlet", seed=seed) for seed in range(10))
+        suite = Suite("overhead", scenes, (Entrant(detector),), (make_evaluator("threshold-free"),))
+        with Store(Path(folder) / "a.sqlite") as store:
+            wall, cpu, own = time.perf_counter(), cpu_seconds(), time.process_time()
+            sweep = make_sweep(suite, [axis_of(f"{name}=1,2,3,4,5") for name in "abcde"], store)
+            _, rows = run_sweep(sweep, store, execution=Execution(jobs=2))
+            wall, cpu, own = time.perf_counter() - wall, cpu_seconds() - cpu, time.process_time() - own
+    detecting = sum(row.cpu_seconds for row in rows)
+    print(f"{len(rows)} runs, {wall:.1f} s wall on 2 workers (ideal {sum(r.seconds for r in rows) / 2:.1f} s)")
+    print(f"detectors      {detecting:8.2f} s CPU")
+    print(f"everything else {cpu - detecting:7.2f} s CPU = {(cpu - detecting) / len(rows) * 1e3:.1f} ms a run,")
+    print(f"    of which {own / len(rows) * 1e3:.1f} ms a run in the main process")
+    print(f"overhead       {(cpu / detecting - 1) * 100:8.1f} %")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""Time listing and filtering of a store of 100 000 runs: ``python tests/benchmarks/bench_store.py``."""
+
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from roofbench.benchmark.keys import SourceClosure
+from roofbench.benchmark.recipes import PluginRecipe, SceneRecipe
+from roofbench.benchmark.records import RunIdentity
+from roofbench.benchmark.store import Store
+from roofbench.benchmark.tasks import Cost, Outcome
+
+RUNS, REPEATS = 100_000, 5
+
+
+def fill(store):
+    """Store runs of 100 detectors on 100 scenes with 10 seeds, one transaction for all of them."""
+    code = SourceClosure({"module": "digest"}, {"numpy": "2"})
+    scenes = [SceneRecipe.of_preset("hamlet", seed=seed) for seed in range(100)]
+    ok = Outcome(status="ok", cost=Cost(seconds=1.0, cpu_seconds=1.0, peak_memory=100_000_000))
+    failed = Outcome(status="failed", reason="ValueError: no", traceback="Traceback")
+    store._db.execute("PRAGMA synchronous = OFF")
+    for scene in scenes:
+        key = scene.key
+        for number in range(RUNS // 100):
+            identity = RunIdentity(
+                detector=PluginRecipe("ndsm", {"height": number // 10}),
+                label=f"ndsm[height={number // 10}]",
+                fingerprint="",
+                code=code,
+                scene=scene,
+                scene_key=key,
+                seed=number % 10,
+            )
+            store.record(identity, failed if number % 50 == 0 else ok, version="1")
+
+
+def median(function):
+    times = []
+    for _ in range(REPEATS):
+        started = time.process_time()
+        function()
+        times.append(time.process_time() - started)
+    return statistics.median(times)
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "big.sqlite"
+        with Store(path) as store:
+            started = time.process_time()
+            fill(store)
+            print(f"recording {RUNS} runs: {(time.process_time() - started) / RUNS * 1e3:.2f} ms CPU each")
+        with Store(path) as store:
+            print(f"list all            {median(lambda: store.runs()):6.3f} s CPU")
+            print(f"failed ones         {median(lambda: store.runs(status='failed')):6.3f} s CPU")
+            print(f"by detector pattern {median(lambda: store.runs(detector='ndsm[[]height=7?]')):6.3f} s CPU")
+            print(f"by scene pattern    {median(lambda: store.runs(scene='hamlet-1?')):6.3f} s CPU")
+            keys = [row.key for row in store.runs(limit=20_000)]
+            print(f"status of 20000 keys {median(lambda: store.statuses(keys)):5.3f} s CPU")
+        for words in (["-n", "0"], ["-n", "0", "-f", "csv"], ["--status", "failed", "--scene", "hamlet-1*"]):
+            command = [sys.executable, "-m", "roofbench", "ls", "--store", str(path), *words]
+            started = resource.getrusage(resource.RUSAGE_CHILDREN)
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+            used = ended.ru_utime + ended.ru_stime - started.ru_utime - started.ru_stime
+            print(f"roofbench ls {' '.join(words):40} {used:6.3f} s CPU, whole process")
+
+
+if __name__ == "__main__":
+    main()
