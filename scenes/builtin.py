@@ -137,16 +137,22 @@ def _trees(rng: np.random.Generator) -> Array:
 
 def _surfaces(houses: list[_House], trees: Array, x: Array, y: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     """Return height above ground of roofs and of crowns (0 where none), and which house it is (-1 none)."""
-    roof, which = np.zeros(x.shape), np.full(x.shape, -1)
+    roof, crown, which = np.zeros(x.shape), np.zeros(x.shape), np.full(x.shape, -1)
     for number, house in enumerate(houses):
-        height = house.roof(x, y)
-        which = np.where(height > roof, number, which)
-        roof = np.maximum(roof, height)
-    crown = np.zeros(x.shape)
+        near = _near(x, y, house.x, house.y, np.hypot(house.length, house.width) / 2)
+        height = house.roof(x[near], y[near])
+        which[near] = np.where(height > roof[near], number, which[near])
+        roof[near] = np.maximum(roof[near], height)
     for tree_x, tree_y, radius, height in trees:
-        reach = np.clip(1 - ((x - tree_x) ** 2 + (y - tree_y) ** 2) / radius**2, 0, None)
-        crown = np.maximum(crown, np.where(reach > 0, height * (0.55 + 0.45 * np.sqrt(reach)), 0))
+        near = _near(x, y, tree_x, tree_y, radius)
+        reach = np.clip(1 - ((x[near] - tree_x) ** 2 + (y[near] - tree_y) ** 2) / radius**2, 0, None)
+        crown[near] = np.maximum(crown[near], np.where(reach > 0, height * (0.55 + 0.45 * np.sqrt(reach)), 0))
     return roof, crown, which
+
+
+def _near(x: Array, y: Array, centre_x: float, centre_y: float, reach: float) -> tuple[NDArray[np.intp], ...]:
+    """Return the indices of places in a square around a centre."""
+    return np.nonzero((np.abs(x - centre_x) <= reach) & (np.abs(y - centre_y) <= reach))
 
 
 def _points(houses: list[_House], trees: Array, rng: np.random.Generator) -> PointCloud:
@@ -179,9 +185,10 @@ def _image(houses: list[_House], trees: Array, rng: np.random.Generator) -> Imag
     patch = np.sin((x - _EAST) / 9) * np.sin((y - _NORTH) / 13)
     colours = np.stack([104 + 22 * patch, 122 + 12 * patch, 78 + 14 * patch])
     for number, house in enumerate(houses):
-        _, across = house.local(x, y)
+        on_it = which == number
+        _, across = house.local(x[on_it], y[on_it])
         light = np.where(across > 0, 1.08, 0.86 if house.ridge else 1.08)
-        colours = np.where(which == number, house.colour[:, None, None] * light, colours)
+        colours[:, on_it] = house.colour[:, None] * light
     green = np.stack([58 + 30 * crown / 9, 88 + 34 * crown / 9, 46 + 20 * crown / 9])
     colours = np.where(crown > roof, green, colours)
     colours = colours + rng.normal(0, 5, colours.shape)
