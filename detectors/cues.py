@@ -39,6 +39,8 @@ _NEIGHBOURS = 3
 _LEAST_POINTS = 6
 #: Least ratio of the spread of the points in two directions (determinant over squared mean of their covariance).
 _FLATTEST = 1e-3
+#: Cells of a strip.
+_STRIP = 1_000_000
 #: Where there is no plane: a deviation that is never the least.
 _NO_PLANE = np.float32(1e9)
 
@@ -102,10 +104,7 @@ def cell_cues(
     if returns is not None and (returns[used] > 1).any():
         multiple = _on_grid(np.bincount(index[high[returns[high] > 1]], minlength=size), grid)
         multiple_share = _share(_box(multiple), _box(n_high))
-    middle = grid.to_world(grid.rows / 2, grid.columns / 2)
-    base = float(points.z[high].mean()) if len(high) else 0.0
-    moments = _moments(points.x, points.y, points.z, index, high, np.array(middle), base, grid.shape)
-    smoothest = _smoothest_plane(moments, max(2, round(window / grid.gsd)))
+    smoothest = _smoothest_plane(points, index, high, grid, max(2, round(window / grid.gsd)))
     shared = _share(_box(n_high), _box(count))
     return CellCues(
         grid=grid,
@@ -175,10 +174,10 @@ def _share(part: _Floats, whole: _Floats) -> _Floats:
 
 @njit(cache=True)
 def _moments(x, y, z, index, chosen, middle, base, shape):  # type: ignore[no-untyped-def]
-    """Return n, x, y, z, xx, xy, yy, xz, yz, zz of the chosen points per cell, from the middle of the grid."""
+    """Return n, x, y, z, xx, xy, yy, xz, yz, zz of the chosen points in their cells `index`, from a middle and base."""
     sums = np.zeros((10, shape[0] * shape[1]))
-    for i in chosen:
-        cell = index[i]
+    for position in range(len(chosen)):
+        i, cell = chosen[position], index[position]
         dx, dy, dz = x[i] - middle[0], y[i] - middle[1], z[i] - base
         sums[0, cell] += 1
         sums[1, cell] += dx
@@ -193,18 +192,35 @@ def _moments(x, y, z, index, chosen, middle, base, shape):  # type: ignore[no-un
     return sums.reshape((10, shape[0], shape[1]))
 
 
-def _smoothest_plane(moments: NDArray[np.float64], width: int) -> _Floats:
-    """Return the least deviation from a plane among the windows of width x width cells that hold a cell."""
+def _smoothest_plane(
+    points: PointCloud, index: NDArray[np.intp], chosen: NDArray[np.intp], grid: Grid, width: int
+) -> _Floats:
+    """Return the least deviation from a plane among the windows of width x width cells that hold a cell.
+
+    The grid is worked through in strips of rows: ten moments per cell are much more than the points themselves.
+    """
     import cv2
 
     before = (width - 1) // 2
-    for moment in moments:
-        cv2.boxFilter(
-            moment, -1, (width, width), moment, (before, before), normalize=False, borderType=cv2.BORDER_CONSTANT
-        )
     after = width - 1 - before
-    rough = _plane_deviation(moments)
-    smoothest: _Floats = cv2.erode(rough, np.ones((width, width), np.uint8), anchor=(after, after))
+    window = np.ones((width, width), np.uint8)
+    smoothest = np.empty(grid.shape, dtype=np.float32)
+    middle = np.array(grid.to_world(grid.rows / 2, grid.columns / 2))
+    base = float(points.z[chosen].mean()) if len(chosen) else 0.0
+    row = index[chosen] // grid.columns
+    strip = max(4 * width, _STRIP // grid.columns)
+    for top in range(0, grid.rows, strip):
+        # A cell's windows reach width - 1 rows beyond it.
+        first, last = max(top - width + 1, 0), min(top + strip + width - 1, grid.rows)
+        here = chosen[(row >= first) & (row < last)]
+        shape = (last - first, grid.columns)
+        moments = _moments(points.x, points.y, points.z, index[here] - first * grid.columns, here, middle, base, shape)
+        for moment in moments:
+            cv2.boxFilter(
+                moment, -1, (width, width), moment, (before, before), normalize=False, borderType=cv2.BORDER_CONSTANT
+            )
+        least = cv2.erode(_plane_deviation(moments), window, anchor=(after, after))
+        smoothest[top : top + strip] = least[top - first : top - first + strip]
     return smoothest
 
 

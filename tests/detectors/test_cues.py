@@ -85,3 +85,17 @@ def test_shadow_and_missing_pixels_have_no_greenness():
 def test_a_grey_image_has_no_greenness():
     grey = Image(np.full((1, 8, 10), 100, dtype=np.uint8), ("grey",), GRID)
     assert greenness(grey, GRID, darkest=0.1) is None
+
+
+@pytest.mark.parametrize("window", [2.0, 3.0])
+def test_working_in_strips_changes_nothing(monkeypatch, window):
+    import roofbench.detectors.cues as module
+
+    x, y, z = cloud(seed=4)
+    points, heights = PointCloud(x, y * 4 - 2730, z), z.astype(np.float32)
+    grid = Grid(500.0, 910.0, 1.0, 32, 10)
+    whole = cell_cues(points, heights, grid, threshold=2.5, window=window).roughness
+    monkeypatch.setattr(module, "_STRIP", 1)
+    np.testing.assert_allclose(
+        cell_cues(points, heights, grid, threshold=2.5, window=window).roughness, whole, rtol=1e-5
+    )
