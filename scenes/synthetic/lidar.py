@@ -44,7 +44,7 @@ _CHUNK = 250_000
 _POOL = int(Cover.POOL)
 _BUILDING, _FURNITURE, _HEDGE = int(Body.BUILDING), int(Body.FURNITURE), int(Body.HEDGE)
 #: First extinction (to the first return) and later extinction, per metre of leaves.
-_DENSE, _LOOSE = 1.1, 0.42
+_DENSE, _LOOSE = 0.85, 0.42
 
 
 def scan(world: World, origin: tuple[float, float]) -> PointCloud:
@@ -159,11 +159,13 @@ def _strip(
     out = np.empty((lines * dots, 4))
     count = 0
     for i in range(lines):
-        drift = 0.35 * math.sin(i * 0.013 + 6.0 * phase) + 0.12 * gauss(key, i)
+        # Aircraft and mirror speed vary slowly: lines and pulses crowd here and thin out there.
+        drift = 3.0 * math.sin(i * along_step / 37.0 + 6.0 * phase) / along_step + 0.12 * gauss(key, i)
         for k in range(dots):
             counter = (i * dots + k) * 2 + (1 << 40)
-            q = low + (k + 0.5 * (i & 1) + phase + 0.16 * gauss(key, counter)) * across_step
-            p = -reach + (i + drift + 0.10 * gauss(key, counter + 1)) * along_step
+            crowding = 2.0 * math.sin((low + k * across_step) / 29.0 + 9.0 * phase)
+            q = low + crowding + (k + 0.5 * (i & 1) + phase + 0.40 * gauss(key, counter)) * across_step
+            p = -reach + (i + drift + 0.36 * gauss(key, counter + 1)) * along_step
             if q >= high:
                 continue
             x, y = cx + cosine * p - sine * q, cy + sine * p + cosine * q

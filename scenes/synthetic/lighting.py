@@ -16,10 +16,13 @@ from .streams import uniform
 from .surface import Surface
 from .world import World
 
-__all__ = ["AMBIENT", "colour_surface", "sun_vector", "sunlit"]
+__all__ = ["AMBIENT", "HAZE", "colour_surface", "sun_vector", "sunlit"]
 
 #: Share of the light on flat ground that comes from the sky, per band: the sky is blue, so shadows are.
-AMBIENT: NDArray[np.float32] = np.array((0.34, 0.37, 0.42, 0.26), dtype=np.float32)
+AMBIENT: NDArray[np.float32] = np.array((0.36, 0.39, 0.44, 0.28), dtype=np.float32)
+#: Light that the air between camera and ground adds, per band, in grey values, and the gain of the exposure.
+HAZE: NDArray[np.float32] = np.array((11.0, 12.5, 14.0, 5.0), dtype=np.float32)
+_GAIN = 1.04
 
 _TILES, _CORRUGATED, _GRAVEL, _PLANTED, _LEAVES = (
     int(look) for look in (Texture.TILES, Texture.CORRUGATED, Texture.GRAVEL, Texture.PLANTED, Texture.LEAVES)
@@ -109,6 +112,7 @@ def colour_surface(
         GROUND,
         LAWNS,
         AMBIENT,
+        HAZE,
         (float(world.layout.pattern[8]), float(world.layout.pattern[9])),
     )
     return colours
@@ -137,6 +141,7 @@ def _paint(
     ground: NDArray[np.float32],
     lawns: NDArray[np.float32],
     ambient: NDArray[np.float32],
+    haze: NDArray[np.float32],
     turn: tuple[float, float],
 ) -> None:
     west, north, gsd = frame
@@ -172,7 +177,7 @@ def _paint(
                 )
             for b in range(bands):
                 light = ambient[b] + ((1.0 - ambient[b]) * direct if lit[r, c] else 0.0)
-                colours[b, r, c] = int(min(max(albedo[b] * light * 255.0, 2.0), 253.0))
+                colours[b, r, c] = int(min(max(albedo[b] * light * 255.0 * _GAIN + haze[b], 2.0), 253.0))
 
 
 @njit(cache=True)
@@ -270,9 +275,9 @@ def _leaf_albedo(
     scale = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz + 1e-12)
     facing = (nx * sun[0] + ny * sun[1] + nz * sun[2]) * scale
     # Leaves stand in all directions, so the normal counts only in part.
-    direct = max(0.32 + 0.62 * facing + 0.20 * grain, 0.0)
+    direct = max(0.38 + 0.62 * facing + 0.20 * grain, 0.0)
     height = (z - size[t, 0]) / size[t, 1]
-    factor = (0.62 + 0.38 * min(max(height, 0.0), 1.0)) * (1.0 + 0.13 * grain + 0.05 * patchy)
+    factor = (0.78 + 0.30 * min(max(height, 0.0), 1.0)) * (1.0 + 0.13 * grain + 0.05 * patchy)
     for b in range(4):
         albedo[b] = colour[t, b] * factor
     return float(direct)

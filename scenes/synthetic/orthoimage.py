@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..raster import Grid, Image
 from .groundcover import cover_codes
-from .lighting import AMBIENT, colour_surface, sun_vector
+from .lighting import AMBIENT, HAZE, colour_surface, sun_vector
 from .recipe import SceneParameters
 from .streams import counter_key, fractal_tile, gauss, stream
 from .surface import rasterise
@@ -70,6 +70,7 @@ def photograph(world: World, origin: tuple[float, float]) -> Image | None:
         world.solids.base,
         sun_vector(recipe),
         AMBIENT,
+        HAZE,
     )
     values = _expose(leaning, _kernel(recipe.blur), recipe.image_noise, counter_key(world.seed, "image"))
     moved = Grid(grid.west + origin[0], grid.north + origin[1], grid.gsd, grid.rows, grid.columns)
@@ -138,6 +139,7 @@ def _lean(
     base: NDArray[np.float64],
     sun: tuple[float, float, float],
     ambient: NDArray[np.float32],
+    haze: NDArray[np.float32],
 ) -> None:
     """Follow, for every image cell, the ray from its place on the bare earth to the camera: the last hit is seen."""
     west, north, gsd = frame
@@ -181,7 +183,7 @@ def _lean(
                 for b in range(bands):
                     out[b, r, c] = int(colours[b, i, j] * 0.72)
             else:
-                _wall(out, r, c, (mark - 1) >> 3, x, y, side, tx, ty, lean, wall, base, sun, ambient)
+                _wall(out, r, c, (mark - 1) >> 3, x, y, side, tx, ty, lean, wall, base, sun, ambient, haze)
 
 
 @njit(cache=True)
@@ -200,6 +202,7 @@ def _wall(
     base: NDArray[np.float64],
     sun: tuple[float, float, float],
     ambient: NDArray[np.float32],
+    haze: NDArray[np.float32],
 ) -> None:
     """Colour a cell that shows a wall: it looks towards the camera; floors are bands of windows."""
     towards = (tx * sun[0] + ty * sun[1]) / math.sqrt(tx * tx + ty * ty)
@@ -208,7 +211,7 @@ def _wall(
     window = 0.62 if 0.35 < storey < 0.8 and ((x + y) * 0.31) % 1.0 < 0.7 else 1.0
     for b in range(out.shape[0]):
         light = ambient[b] * 1.1 + (1.0 - ambient[b]) * direct * 0.9
-        out[b, r, c] = int(min(wall[k, b] * window * light * 255.0, 250.0))
+        out[b, r, c] = int(min(wall[k, b] * window * light * 255.0 + haze[b], 250.0))
 
 
 @njit(cache=True)

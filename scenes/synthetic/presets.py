@@ -176,6 +176,8 @@ _VAIHINGEN: dict[str, Any] = {
     "sun_azimuth": 165,
     "sun_elevation": 46,
     "park_share": 0.1,
+    "vertical_noise": 0.04,
+    "horizontal_noise": 0.08,
 }
 
 #: The parts of Fairfield without industry, where garages and sheds are many.

@@ -130,7 +130,13 @@ class SceneParameters(Parameterised):
         0.0, unit="m", minimum=0, maximum=10, doc="offset of the orthoimage against the points", swept=(0, 0.5, 1, 2)
     )
 
-    dem_error: float = parameter(0.12, unit="m", minimum=0, maximum=5, doc="standard deviation of the DEM's own error")
+    dem_error: float = parameter(
+        0.12,
+        unit="m",
+        minimum=0,
+        maximum=5,
+        doc="standard deviation of the DEM's own error, vertical; three times that in place",
+    )
     reference_error: float = parameter(
         0.0, unit="m", minimum=0, maximum=3, doc="digitising error of a corner, each axis"
     )

@@ -24,6 +24,8 @@ __all__ = ["distance_to_rectangle", "measured_dem", "natural_terrain", "terraced
 
 _MARGIN = 24.0
 _FADE = 5.0
+#: Horizontal error of the DEM relative to its vertical one.
+_HORIZONTAL = 3.0
 
 
 def natural_terrain(recipe: SceneParameters, seed: int) -> Elevation:
@@ -127,6 +129,9 @@ def measured_dem(world: World, origin: tuple[float, float]) -> Elevation:
     smooth = fractal_field(rng, grid.shape, grid.gsd, (35.0, 12.0, 4.0), 0.6)
     rough = rng.random(grid.shape) + rng.random(grid.shape) + rng.random(grid.shape) - 1.5
     error = recipe.dem_error * (0.9 * smooth / max(float(smooth.std()), 1e-9) + 0.35 * rough / 0.5)
-    values = world.terrain.sample(*np.broadcast_arrays(x, y)) + error
+    # A survey is several times less sure of where a height lies than of the height, which matters on slopes.
+    aside = [fractal_field(rng, grid.shape, grid.gsd, (80.0, 30.0), 0.6) for _ in range(2)]
+    aside = [_HORIZONTAL * recipe.dem_error * field / max(float(field.std()), 1e-9) for field in aside]
+    values = world.terrain.sample(x + aside[0], y + aside[1]) + error
     moved = Grid(grid.west + origin[0], grid.north + origin[1], grid.gsd, grid.rows, grid.columns)
     return Elevation(values.astype(np.float32), moved)

@@ -207,14 +207,14 @@ def _leafy(
     blobs = np.empty((len(x), _LOBES + 1, 5))
     deep = np.minimum(0.36 * height, 1.15 * radius)
     middle = ground + height - deep
-    blobs[:, 0] = np.stack([x, y, middle - 0.12 * deep, 0.70 * radius, 0.78 * deep], axis=-1)
+    blobs[:, 0] = np.stack([x, y, middle - 0.12 * deep, 0.62 * radius, 0.76 * deep], axis=-1)
     for k in range(_LOBES):
         turn, up, out, size = lobes[:, k, 0], lobes[:, k, 1], lobes[:, k, 2], lobes[:, k, 3]
         cosine, sine = _direction(k / _LOBES + 0.12 * turn)
         # The first lobes form the rim, the later ones the top.
         rim = k < _LOBES * 0.6
-        away = radius * (0.50 + 0.24 * out if rim else 0.42 * out)
-        lift = deep * (-0.45 + 0.55 * up if rim else 0.28 + 0.32 * up)
+        away = radius * (0.46 + 0.42 * out if rim else 0.42 * out)
+        lift = deep * (-0.60 + 0.75 * up if rim else 0.20 + 0.42 * up)
         girth = radius * (0.26 + 0.20 * size if rim else 0.28 + 0.16 * size)
         blobs[:, k + 1] = np.stack(
             [x + away * cosine, y + away * sine, middle + lift, girth, np.minimum(girth, deep * 0.42)], axis=-1
