@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from .parcels import Sites
 from .recipe import SceneParameters
 from .solids import Body, Roof, Solid, Texture
 from .streams import stream
-from .terrain import distance_to_rectangle
+from .vegetation import nearest_rectangle, rectangle_table
 
 __all__ = ["Cover", "Patch", "scatter"]
 
@@ -61,7 +62,6 @@ def scatter(
     """Return the clutter of all parcels and streets, and the ground patches."""
     rows = stream(seed, "clutter").random((len(sites), 160))
     walls = [solid for solid in town.solids if solid.body == Body.BUILDING]
-    near = _Neighbours(walls)
     garages: dict[int, list[Solid]] = {}
     for site, solid in town.garages:
         garages.setdefault(site, []).append(solid)
@@ -83,29 +83,21 @@ def scatter(
         patches += grounds
     solids += _parked(layout, recipe, seed)
     inside = [solid for solid in solids if 1 < solid.x < recipe.width - 1 and 1 < solid.y < recipe.height - 1]
-    return [solid for solid in inside if near.clear(solid)], patches
+    return _clear_of_buildings(inside, walls), patches
 
 
-class _Neighbours:
-    """Buildings by cells of 40 m, to ask whether a thing would stand in one."""
-
-    def __init__(self, buildings: list[Solid]) -> None:
-        self._cells: dict[tuple[int, int], list[Solid]] = {}
-        for solid in buildings:
-            reach = math.hypot(solid.length, solid.width) / 2 + 12
-            for i in range(int((solid.x - reach) // 40), int((solid.x + reach) // 40) + 1):
-                for j in range(int((solid.y - reach) // 40), int((solid.y + reach) // 40) + 1):
-                    self._cells.setdefault((i, j), []).append(solid)
-
-    def clear(self, thing: Solid) -> bool:
-        """Whether a thing keeps clear of all buildings, judged at points along its axis."""
-        steps = np.linspace(-0.5, 0.5, max(2, math.ceil(thing.length / 2) + 1)) * thing.length
-        x, y = thing.x + math.cos(thing.angle) * steps, thing.y + math.sin(thing.angle) * steps
-        margin = thing.width / 2
-        for solid in self._cells.get((int(thing.x // 40), int(thing.y // 40)), ()):
-            if distance_to_rectangle(x, y, solid).min() < margin:
-                return False
-        return True
+def _clear_of_buildings(things: list[Solid], buildings: Sequence[Solid]) -> list[Solid]:
+    """Return the things that stand in no building, judged at points along their axis."""
+    steps = [max(2, math.ceil(thing.length / 2) + 1) for thing in things]
+    starts = np.cumsum([0, *steps[:-1]])
+    x, y = np.empty(sum(steps)), np.empty(sum(steps))
+    for thing, start, count in zip(things, starts.tolist(), steps, strict=True):
+        along = (np.arange(count) / (count - 1) - 0.5) * thing.length
+        x[start : start + count] = thing.x + math.cos(thing.angle) * along
+        y[start : start + count] = thing.y + math.sin(thing.angle) * along
+    distance = nearest_rectangle(x, y, rectangle_table(buildings))
+    nearest = np.minimum.reduceat(distance, starts) if things else distance
+    return [thing for thing, away in zip(things, nearest.tolist(), strict=True) if away >= thing.width / 2]
 
 
 def _garden(

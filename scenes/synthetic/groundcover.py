@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..raster import Grid
 from .clutter import Cover
-from .layout import FIELDS, HALLS, PARK, TOWERS, locate, zone_of
+from .layout import FIELDS, HALLS, PARK, TOWERS, zone_of
 from .parcels import HALL_WIDTH
 from .streams import uniform
 from .world import World, ground_at
@@ -62,13 +62,27 @@ def _streets(
 ) -> None:
     west, north, gsd = frame
     period, length, street, cross = pattern[0], pattern[1], pattern[2], pattern[3]
+    line = np.empty((2, u.shape[1]))
+    known, offset = 1 << 30, 0.0
     for r in range(codes.shape[0]):
+        # Interpolated down once a row, then across for every cell.
         y = north - (r + 0.5) * gsd
+        for k in range(u.shape[1]):
+            x = raster[0] + (k + 0.5) * raster[2]
+            line[0, k] = ground_at(u, raster[0], raster[1], raster[2], x, y)
+            line[1, k] = ground_at(v, raster[0], raster[1], raster[2], x, y)
         for c in range(codes.shape[1]):
-            x = west + (c + 0.5) * gsd
-            pu = ground_at(u, raster[0], raster[1], raster[2], x, y)
-            pv = ground_at(v, raster[0], raster[1], raster[2], x, y)
-            block, row, along, across = locate(pu, pv, pattern, key)
+            position = (west + (c + 0.5) * gsd - raster[0]) / raster[2] - 0.5
+            k = int(position)
+            right = position - k
+            pu = line[0, k] + (line[0, k + 1] - line[0, k]) * right
+            pv = line[1, k] + (line[1, k + 1] - line[1, k]) * right
+            row = math.floor((pv - pattern[5]) / period)
+            if row != known:
+                # Its stagger is the same all along a row, and hashing is slow.
+                known, offset = row, pattern[4] + pattern[6] * uniform(key, row) * length
+            block = math.floor((pu - offset) / length)
+            along, across = pu - offset - block * length, pv - pattern[5] - row * period
             zone = zone_of(block, row, zones, first)
             main = street / 2 - min(across, period - across)  # depth into the street, negative on parcels
             side = cross / 2 - min(along, length - along)

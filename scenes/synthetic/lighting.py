@@ -155,8 +155,8 @@ def _paint(
             x = west + (c + 0.5) * gsd
             mark = label[r, c]
             grain = fine[r & mask, c & mask]
-            # Coarse noise is tied to metres: one cell of the tile is 0.25 m.
-            patchy = coarse[int(y * 4.0 + 4096) & wide, int(x * 4.0 + 4096) & wide]
+            # Coarse noise is tied to metres: one cell of the tile is 0.5 m.
+            patchy = coarse[int(y * 2.0) & wide, int(x * 2.0) & wide]
             if mark == 0:
                 drill = turn[0] * y - turn[1] * x  # across the drills of a field
                 direct = _ground_albedo(albedo, codes[r, c], drill, grain, patchy, ground, lawns)

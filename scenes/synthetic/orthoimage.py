@@ -21,14 +21,15 @@ from ..raster import Grid, Image
 from .groundcover import cover_codes
 from .lighting import AMBIENT, HAZE, colour_surface, sun_vector
 from .recipe import SceneParameters
-from .streams import counter_key, fractal_tile, gauss, stream
+from .streams import counter_key, fractal_tile, gauss, stream, uniform
 from .surface import rasterise
 from .world import World, ground_at
 
 __all__ = ["camera_position", "photograph"]
 
-_BLOCK = 32
-_TILE = 1024
+_BLOCK = 8
+_TILE = 512
+_NOISE = 1 << 16
 
 
 def camera_position(recipe: SceneParameters, seed: int) -> tuple[float, float, float]:
@@ -50,7 +51,7 @@ def photograph(world: World, origin: tuple[float, float]) -> Image | None:
     names = ("red", "green", "blue", "nir")[: len(recipe.bands)]
     grid = Grid.covering((0, 0, recipe.width, recipe.height), recipe.gsd)
     rng = stream(world.seed, "texture")
-    fine, coarse = fractal_tile(rng, _TILE, 4, 0.8), fractal_tile(rng, _TILE, 128, 0.62)
+    fine, coarse = fractal_tile(rng, _TILE, 4, 0.8), fractal_tile(rng, _TILE, 64, 0.62)
     surface = rasterise(world, grid, fine)
     colours = colour_surface(world, surface, cover_codes(world, grid), (fine, coarse), len(names))
     shift = _shift(recipe, world.seed)
@@ -93,35 +94,77 @@ def _kernel(sigma: float) -> NDArray[np.float32]:
 
 
 @njit(cache=True)
-def _reach(
-    z: NDArray[np.float32],
+def _block_tops(z: NDArray[np.float32], label: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Return the highest thing in each block of the image; far below everything where the ground is bare."""
+    tops = np.full(((z.shape[0] + _BLOCK - 1) // _BLOCK, (z.shape[1] + _BLOCK - 1) // _BLOCK), -1e9)
+    for r in range(z.shape[0]):
+        for c in range(z.shape[1]):
+            if label[r, c] != 0 and z[r, c] > tops[r // _BLOCK, c // _BLOCK]:
+                tops[r // _BLOCK, c // _BLOCK] = z[r, c]
+    return tops
+
+
+@njit(cache=True)
+def _first_heights(
+    tops: NDArray[np.float64],
     frame: tuple[float, float, float],
     terrain: NDArray[np.float32],
     raster: tuple[float, float, float],
     camera: tuple[float, float, float],
 ) -> NDArray[np.float64]:
-    """Return, per block of the image, the greatest height above ground that can lean into it."""
-    rows, columns = (z.shape[0] + _BLOCK - 1) // _BLOCK, (z.shape[1] + _BLOCK - 1) // _BLOCK
-    own = np.zeros((rows, columns))
-    for r in range(z.shape[0]):
-        y = frame[1] - (r + 0.5) * frame[2]
-        for c in range(z.shape[1]):
-            height = z[r, c] - ground_at(terrain, raster[0], raster[1], raster[2], frame[0] + (c + 0.5) * frame[2], y)
-            if height > own[r // _BLOCK, c // _BLOCK]:
-                own[r // _BLOCK, c // _BLOCK] = height
-    widest = max(abs(camera[0] - frame[0]), abs(camera[0] - frame[0] - z.shape[1] * frame[2]))
-    deepest = max(abs(camera[1] - frame[1]), abs(camera[1] - frame[1] + z.shape[0] * frame[2]))
-    lean = math.sqrt(widest * widest + deepest * deepest) / (camera[2] - z.max())
-    reach = np.zeros((rows, columns))
-    for r in range(rows):
-        for c in range(columns):
-            if own[r, c] < 0.1:
-                continue
-            away = int(own[r, c] * lean / (_BLOCK * frame[2])) + 1
-            for i in range(max(0, r - away), min(rows, r + away + 1)):
-                for j in range(max(0, c - away), min(columns, c + away + 1)):
-                    reach[i, j] = max(reach[i, j], own[r, c])
-    return reach
+    """Return, per block, a height above ground above which no ray of its cells can meet anything.
+
+    The ray of the block's centre is followed block by block; neighbours count too, as the block has a size and rays
+    of its cells differ a little.
+    """
+    rows, columns = tops.shape
+    size = _BLOCK * frame[2]
+    wide = tops.copy()
+    for i in range(rows):
+        for j in range(columns):
+            for m in range(max(0, i - 1), min(rows, i + 2)):
+                for n in range(max(0, j - 1), min(columns, j + 2)):
+                    wide[i, j] = max(wide[i, j], tops[m, n])
+    highest = tops.max()
+    first = np.zeros((rows, columns))
+    for i in range(rows):
+        y = frame[1] - (i + 0.5) * size
+        for j in range(columns):
+            x = frame[0] + (j + 0.5) * size
+            ground = ground_at(terrain, raster[0], raster[1], raster[2], x, y)
+            low = ground
+            for m in (-0.5, 0.5):
+                for n in (-0.5, 0.5):
+                    low = min(low, ground_at(terrain, raster[0], raster[1], raster[2], x + m * size, y + n * size))
+            tx, ty = (camera[0] - x) / (camera[2] - ground), (camera[1] - y) / (camera[2] - ground)
+            rise = size / max(abs(tx), abs(ty), 1e-6)
+            k = 0
+            while (k - 1.5) * rise < highest - low:
+                height = k * rise
+                p, q = int((frame[1] - y - ty * height) / size), int((x + tx * height - frame[0]) / size)
+                if p < 0 or q < 0 or p >= rows or q >= columns:
+                    break
+                over = wide[p, q] - low
+                if over >= (k - 1.5) * rise:
+                    first[i, j] = max(first[i, j], min(over, (k + 1.5) * rise))
+                k += 1
+    return first
+
+
+@njit(cache=True)
+def _block_exit(i: int, j: int, k: int, step: float, columns: float, rows: float) -> int:
+    """Return the step at which a ray that comes down is certainly still in, or just leaves, the block of (i, j).
+
+    `columns` and `rows` are the cells that the ray moves per metre of height.
+    """
+    fewest = 1e9
+    if abs(columns) > 1e-9:
+        room = j % _BLOCK if columns > 0 else _BLOCK - 1 - j % _BLOCK
+        fewest = min(fewest, room / (abs(columns) * step))
+    if abs(rows) > 1e-9:
+        room = i % _BLOCK if rows > 0 else _BLOCK - 1 - i % _BLOCK
+        fewest = min(fewest, room / (abs(rows) * step))
+    return k - max(int(fewest), 1)
 
 
 @njit(cache=True)
@@ -144,14 +187,15 @@ def _lean(
     """Follow, for every image cell, the ray from its place on the bare earth to the camera: the last hit is seen."""
     west, north, gsd = frame
     bands, rows, columns = out.shape
-    reach = _reach(z, frame, terrain, raster, camera)
+    tops = _block_tops(z, label)
+    first = _first_heights(tops, frame, terrain, raster, camera)
     for r in range(rows):
         for c in range(columns):
             x = west + (c + 0.5) * gsd - shift[0]
             y = north - (r + 0.5) * gsd - shift[1]
-            i0 = min(max(math.floor((north - y) / gsd), 0), rows - 1)
-            j0 = min(max(math.floor((x - west) / gsd), 0), columns - 1)
-            tallest = reach[i0 // _BLOCK, j0 // _BLOCK]
+            row, column = (north - y) / gsd, (x - west) / gsd
+            i0, j0 = min(max(int(row), 0), rows - 1), min(max(int(column), 0), columns - 1)
+            tallest = first[i0 // _BLOCK, j0 // _BLOCK]
             if tallest < 0.1:
                 for b in range(bands):
                     out[b, r, c] = colours[b, i0, j0]
@@ -160,13 +204,20 @@ def _lean(
             tx, ty = (camera[0] - x) / (camera[2] - ground), (camera[1] - y) / (camera[2] - ground)
             lean = max(abs(tx), abs(ty), 1e-6)
             step = 0.8 * gsd / lean
+            down, right = -ty / gsd, tx / gsd  # cells per metre of height
             count = int(tallest / step) + 1
             i, j, side = i0, j0, -1.0
-            for k in range(count, -1, -1):
+            k = count
+            while k >= 0:
                 height = min(k * step, tallest)
-                pi = math.floor((north - y - ty * height) / gsd)
-                pj = math.floor((x + tx * height - west) / gsd)
+                pi, pj = int(row + down * height), int(column + right * height)
                 if pi < 0 or pj < 0 or pi >= rows or pj >= columns:
+                    k -= 1
+                    continue
+                top = tops[pi // _BLOCK, pj // _BLOCK]
+                if ground + height > top + 0.1 and k > 0:
+                    # Above everything in this block: on to where the ray leaves it or comes down to its top.
+                    k = max(_block_exit(pi, pj, k, step, right, down), min(int((top - ground) / step) + 1, k - 1), 0)
                     continue
                 above = z[pi, pj] - ground - height
                 if above >= -0.05 or k == 0:
@@ -175,6 +226,7 @@ def _lean(
                     if k < count and above > step + 0.6:
                         side = ground + height
                     break
+                k -= 1
             mark = label[i, j]
             if side < 0 or mark == 0:
                 for b in range(bands):
@@ -220,7 +272,11 @@ def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float
     bands, rows, columns = values.shape
     out = np.empty_like(values)
     half = len(kernel) - 1
-    line = np.empty((rows if rows < 1 else 1, columns), dtype=np.float32)
+    line = np.empty((1, columns), dtype=np.float32)
+    # Each row of each band reads the same long strip of noise from a place of its own.
+    grain = np.empty(_NOISE, dtype=np.float32)
+    for k in range(_NOISE):
+        grain[k] = noise * 255.0 * gauss(key, k)
     ring = np.empty((2 * half + 1, columns), dtype=np.float32)
     for b in range(bands):
         for r in range(-half, rows + half):
@@ -242,7 +298,8 @@ def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float
                         ring[(centre - t + half) % (2 * half + 1), c] + ring[(centre + t + half) % (2 * half + 1), c]
                     )
                 line[0, c] = total
+            start = int(uniform(key, (1 << 40) + b * rows + centre) * _NOISE)
             for c in range(columns):
-                value = line[0, c] + noise * 255.0 * gauss(key, (b * rows + centre) * columns + c) + 0.5
+                value = line[0, c] + grain[(start + c) & (_NOISE - 1)] + 0.5
                 out[b, centre, c] = int(min(max(value, 0.0), 255.0))
     return out

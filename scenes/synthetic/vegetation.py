@@ -13,6 +13,7 @@ crown
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,7 @@ from .recipe import MOST_TREES, SceneParameters
 from .solids import Body, Solid
 from .streams import stream
 
-__all__ = ["Trees", "grow", "nearest_rectangle"]
+__all__ = ["Trees", "grow", "nearest_rectangle", "rectangle_table"]
 
 _LOBES = 13
 _STREET_TREES = 0.16
@@ -69,7 +70,7 @@ def grow(terrain: Elevation, layout: Layout, buildings: list[Solid], recipe: Sce
     count = math.ceil(MOST_TREES * recipe.hectares)
     draws = stream(seed, "trees").random((count, 16))
     x, y = _places(draws, layout, recipe)
-    away = _distance_to_buildings(x, y, buildings)
+    away = nearest_rectangle(x, y, rectangle_table(solid for solid in buildings if solid.body == Body.BUILDING))
     clumped = draws[:, 10] < max(recipe.tree_clumping, 0.25)
     allowed = (away >= recipe.tree_gap) & _plantable(x, y, layout, clumped)
     allowed &= (x > -1) & (x < recipe.width + 1) & (y > -1) & (y < recipe.height + 1)
@@ -130,14 +131,9 @@ def _off_road(
     return free
 
 
-def _distance_to_buildings(
-    x: NDArray[np.float64], y: NDArray[np.float64], buildings: list[Solid]
-) -> NDArray[np.float64]:
-    rectangles = np.array(
-        [(s.x, s.y, s.angle, s.length, s.width) for s in buildings if s.body == Body.BUILDING], dtype=np.float64
-    ).reshape(-1, 5)
-    distance: NDArray[np.float64] = nearest_rectangle(x, y, rectangles)
-    return distance
+def rectangle_table(solids: Iterable[Solid]) -> NDArray[np.float64]:
+    """Return x, y, angle, length, width of solids, shape (n, 5)."""
+    return np.array([(s.x, s.y, s.angle, s.length, s.width) for s in solids], dtype=np.float64).reshape(-1, 5)
 
 
 @njit(cache=True)
