@@ -89,7 +89,7 @@ def scatter(
 def _clear_of_buildings(things: list[Solid], buildings: Sequence[Solid]) -> list[Solid]:
     """Return the things that stand in no building, judged at points along their axis."""
     steps = [max(2, math.ceil(thing.length / 2) + 1) for thing in things]
-    starts = np.cumsum([0, *steps[:-1]])
+    starts = np.cumsum([0, *steps])[:-1]
     x, y = np.empty(sum(steps)), np.empty(sum(steps))
     for thing, start, count in zip(things, starts.tolist(), steps, strict=True):
         along = (np.arange(count) / (count - 1) - 0.5) * thing.length

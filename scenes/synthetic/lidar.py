@@ -45,6 +45,8 @@ _POOL = int(Cover.POOL)
 _BUILDING, _FURNITURE, _HEDGE = int(Body.BUILDING), int(Body.FURNITURE), int(Body.HEDGE)
 #: First extinction (to the first return) and later extinction, per metre of leaves.
 _DENSE, _LOOSE = 0.85, 0.42
+#: Extinction of what is left for the surface below a crown, per metre of leaves.
+_OPAQUE = 0.11
 
 
 def scan(world: World, origin: tuple[float, float]) -> PointCloud:
@@ -314,10 +316,11 @@ def _scan_chunk(
         counter = (number + p) * 32
         ground = ground_at(terrain, raster[0], raster[1], raster[2], x, y)
         height, hit, face = _solid_top(x, y, ground, tx, ty, size, solid_cells, planes)
-        echoes = _crown_echoes(
+        echoes, leaves = _crown_echoes(
             x, y, ground, tx, ty, height, size, blob_cells, blobs, tree, leaf_nir, found, echo, key, counter
         )
-        if echoes < _MOST and (echoes == 0 or echo[echoes - 1, 0] > -1.0):
+        # What a crown has not taken reaches the roof or the ground below it.
+        if echoes == 0 or uniform(key, counter + 7) < math.exp(-_OPAQUE * leaves):
             row = min(int((cover[1] - y) / cover[2]), codes.shape[0] - 1)
             column = min(int((x - cover[0]) / cover[2]), codes.shape[1] - 1)
             code = codes[row, column]
@@ -388,14 +391,15 @@ def _crown_echoes(
     echo: NDArray[np.float64],
     key: int,
     counter: int,
-) -> int:
-    """Fill `echo` with the returns of leaves, the highest first; return how many."""
+) -> tuple[int, float]:
+    """Fill `echo` with the returns of leaves, the highest first; return how many, and the length of way in leaves."""
     ways = _leaf_hits(x, y, ground, tx, ty, floor, size, cells, blobs, found)
-    echoes = 0
+    echoes, length = 0, 0.0
     reached = 1e9
     left = -math.log(1.0 - uniform(key, counter + 24)) / _DENSE
     for m in range(ways):
         upper, lower = min(found[m, 0], reached), found[m, 1]
+        length += max(upper - lower, 0.0)
         while upper - lower > left and echoes < _MOST - 1:
             upper -= left
             k = int(found[m, 2])
@@ -407,7 +411,7 @@ def _crown_echoes(
         if upper > lower:
             left -= upper - lower
         reached = min(reached, lower)
-    return echoes
+    return echoes, length
 
 
 @njit(cache=True)

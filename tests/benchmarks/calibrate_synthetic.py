@@ -33,6 +33,7 @@ class Sample:
     roof: np.ndarray
     crown: np.ndarray
     outlines: np.ndarray
+    pulse: np.ndarray  # number of the pulse of each return
     colours: np.ndarray | None  # (n, 3), 0..1
 
 
@@ -50,7 +51,7 @@ def ground_height(cloud):
     return cloud.z - level[tuple(near)].ravel()[flat]
 
 
-def sample(name, cloud, outlines, colours=None):
+def sample(name, cloud, outlines, pulse, colours=None):
     height = ground_height(cloud)
     tree = shapely.STRtree(outlines)
     points = shapely.points(cloud.x, cloud.y)
@@ -59,7 +60,7 @@ def sample(name, cloud, outlines, colours=None):
     roof = on_roof & (height > 2) & (cloud.classification == 6)
     beside = ~np.isin(np.arange(len(cloud)), tree.query(points, predicate="dwithin", distance=1.0)[0])
     crown = beside & (height > 2) & ~np.isin(cloud.classification, (2, 6, 9, 26))
-    return Sample(name, cloud, height, roof, crown, outlines, colours)
+    return Sample(name, cloud, height, roof, crown, outlines, pulse, colours)
 
 
 def read(files, outline_file, name):
@@ -74,11 +75,12 @@ def read(files, outline_file, name):
         number_of_returns=column("number_of_returns"),
         classification=column("classification"),
     )
+    pulse = np.unique(column("gps_time"), return_inverse=True)[1]
     colours = None
     if "red" in clouds[0].point_format.dimension_names:
         colours = np.stack([column(band) for band in ("red", "green", "blue")], -1) / 65535
         colours = colours / (1 if colours.max() > 0.1 else 255 / 65535)
-    return sample(name, cloud, rb.read_footprints(outline_file).polygons, colours)
+    return sample(name, cloud, rb.read_footprints(outline_file).polygons, pulse, colours)
 
 
 def synthetic(name, preset, **parameters):
@@ -88,7 +90,8 @@ def synthetic(name, preset, **parameters):
     cloud, image = scene.points, scene.image
     cells, _ = image.grid.cells(cloud.x, cloud.y)
     colours = image.values[:3].reshape(3, -1).T[cells] / 255
-    return sample(name, cloud, scene.reference.polygons, colours)
+    # The returns of a pulse follow each other.
+    return sample(name, cloud, scene.reference.polygons, np.cumsum(cloud.return_number == 1), colours)
 
 
 def quantiles(values):
@@ -98,6 +101,15 @@ def quantiles(values):
 def multiple(part, select):
     first = select & (part.cloud.return_number == 1)
     return float((part.cloud.number_of_returns[first] > 1).mean())
+
+
+def through(part):
+    """Share of the pulses that first meet a crown and last meet the ground."""
+    last = part.cloud.return_number == part.cloud.number_of_returns
+    level = np.full(part.pulse.max() + 1, np.nan)
+    level[part.pulse[last]] = part.height[last]
+    ends = level[part.pulse[part.crown & (part.cloud.return_number == 1)]]
+    return float((ends[np.isfinite(ends)] < 0.7).mean())
 
 
 def roughness(part, select, most=6000):
@@ -187,6 +199,7 @@ def table(samples):
         "crown height above ground, m": lambda s: quantiles(s.height[s.crown]),
         "pulses with several returns, roofs": lambda s: f"{multiple(s, s.roof):.0%}",
         "pulses with several returns, crowns": lambda s: f"{multiple(s, s.crown):.0%}",
+        "crown pulses that reach the ground": lambda s: f"{through(s):.0%}",
         "roughness of roofs, m": lambda s: " ".join(
             f"{v:.2f}" for v in np.quantile(roughness(s, s.roof), (0.1, 0.5, 0.9))
         ),
