@@ -133,9 +133,9 @@ def _first_heights(
             x = frame[0] + (j + 0.5) * size
             ground = ground_at(terrain, raster[0], raster[1], raster[2], x, y)
             low = ground
-            for m in (-0.5, 0.5):
-                for n in (-0.5, 0.5):
-                    low = min(low, ground_at(terrain, raster[0], raster[1], raster[2], x + m * size, y + n * size))
+            for dx in (-0.5 * size, 0.5 * size):
+                for dy in (-0.5 * size, 0.5 * size):
+                    low = min(low, ground_at(terrain, raster[0], raster[1], raster[2], x + dx, y + dy))
             tx, ty = (camera[0] - x) / (camera[2] - ground), (camera[1] - y) / (camera[2] - ground)
             rise = size / max(abs(tx), abs(ty), 1e-6)
             k = 0
