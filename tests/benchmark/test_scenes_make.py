@@ -47,7 +47,7 @@ def test_list_parameters_names_every_parameter_with_its_range():
     assert "from 0 to 300 1/ha" in listed
 
 
-@pytest.mark.parametrize(("name", "scenes"), [("quick", 5), ("papers", 30), ("gate", 30)])
+@pytest.mark.parametrize(("name", "scenes"), [("papers", 30), ("gate", 30)])
 def test_suites_hold_as_many_scenes_as_they_say(name, scenes):
     assert len(named_suite(name).scenes) == scenes
 
