@@ -47,9 +47,11 @@ def test_list_parameters_names_every_parameter_with_its_range():
     assert "from 0 to 300 1/ha" in listed
 
 
-@pytest.mark.parametrize(("name", "scenes"), [("papers", 30), ("gate", 30)])
-def test_suites_hold_as_many_scenes_as_they_say(name, scenes):
-    assert len(named_suite(name).scenes) == scenes
+def test_the_suite_of_the_papers_holds_every_full_preset_with_three_seeds():
+    full = {name for name in preset_names() if not name.endswith("-small")}
+    scenes = named_suite("papers").scenes
+    assert {scene.place for scene in scenes} == full
+    assert len(scenes) == 3 * len(full)
 
 
 def test_the_sensitivity_suite_turns_one_knob_at_a_time():
