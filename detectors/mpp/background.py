@@ -8,14 +8,16 @@ roughness
     Root mean square distance of a window's heights from their best plane, metres.
 openness
     Mean share of points that a closed surface would not give (see `cells`), of a window.
+texture
+    Roughness and openness of the smoothest window that holds a cell, so that cells at the edge of a roof are judged by
+    the roof and not by the edge.
 evidence
-    log p(texture | roof) - log p(texture | crown), nats; of a cell, that of the best window that holds it, so that
-    cells at the edge of a roof are judged by the roof and not by the edge.
+    log p(texture | roof) - log p(texture | crown), nats.
 score
     What a cell adds to a rectangle besides the fit of its roof: for a high cell, evidence - log p(height | crown); for
     a low and for a void cell a fixed price.
 
-Texture of the two classes is estimated from the scene by EM (expectation maximisation) on a histogram of windows, and
+Texture of the two classes is estimated from the scene by EM (expectation maximisation) on a histogram of cells, and
 held near what roofs and crowns are by pseudo-counts, so that a scene of roofs alone or of crowns alone keeps two
 classes. The crowns' heights are Gaussian as in Yu, Li, Guan & Wang (2013), equation 1, with a floor for outliers.
 """
@@ -31,13 +33,13 @@ from numpy.typing import NDArray
 
 from .cells import HIGH, LOW, Cells
 
-__all__ = ["Background", "estimate_background", "score_cells"]
+__all__ = ["Background", "estimate_background", "score_cells", "textures"]
 
 #: Bins of the histogram: log roughness from 1 cm to 4 m, openness from 0 to 1.
 _ROUGH_BINS, _OPEN_BINS = 24, 8
 _LOG_LOW, _LOG_HIGH = math.log(0.01), math.log(4.0)
 #: What roofs and crowns are like before a scene is seen: median roughness (m), spread of its logarithm, openness.
-_ROOF_ROUGH, _CROWN_ROUGH = (0.08, 0.75), (0.55, 0.55)
+_ROOF_ROUGH, _CROWN_ROUGH = (0.05, 0.75), (0.40, 0.55)
 _ROOF_OPEN = (0.70, 0.12, 0.07, 0.04, 0.03, 0.02, 0.01, 0.01)
 _CROWN_OPEN = (0.22, 0.10, 0.10, 0.10, 0.10, 0.12, 0.12, 0.14)
 #: log p(height | crown) is not less than this, so that a bird or a tower is no proof of anything.
@@ -55,13 +57,13 @@ class Background:
     crown_height, crown_spread : float
         Mean and standard deviation of heights in crowns, metres.
     crown_share : float
-        Share of windows in crowns.
+        Share of cells in crowns.
     roof_roughness, crown_roughness : float
         Median roughness, metres.
     evidence : tuple of tuple of float
         Nats per bin of log roughness and of openness, (24, 8).
-    windows : int
-        How many windows it was estimated from.
+    cells : int
+        How many cells it was estimated from.
     """
 
     crown_height: float
@@ -70,14 +72,14 @@ class Background:
     roof_roughness: float
     crown_roughness: float
     evidence: tuple[tuple[float, ...], ...]
-    windows: int
+    cells: int
 
 
 @njit(cache=True, nogil=True)
-def _window_bins(height, state, openness):  # type: ignore[no-untyped-def]
-    """Return the bin of each window at its centre cell, -1 where there is none: shape (rows, columns), int16."""
+def textures(height, state, openness):  # type: ignore[no-untyped-def]
+    """Return the bin of the texture of each cell, -1 where no window holds it: shape (rows, columns), int16."""
     rows, columns = state.shape
-    bins = np.full((rows, columns), -1, dtype=np.int16)
+    bins = np.full((rows, columns), np.int16(_ROUGH_BINS * _OPEN_BINS), dtype=np.int16)
     for r in range(1, rows - 1):
         for c in range(1, columns - 1):
             if state[r, c] != HIGH:
@@ -101,19 +103,25 @@ def _window_bins(height, state, openness):  # type: ignore[no-untyped-def]
             share = (math.log(max(rough, 0.01)) - _LOG_LOW) / (_LOG_HIGH - _LOG_LOW)
             a = min(int(share * _ROUGH_BINS), _ROUGH_BINS - 1)
             b = min(int(openly / 9.0 / 255.0 * _OPEN_BINS), _OPEN_BINS - 1)
-            bins[r, c] = a * _OPEN_BINS + b
+            for i in range(-1, 2):
+                for j in range(-1, 2):
+                    bins[r + i, c + j] = min(bins[r + i, c + j], a * _OPEN_BINS + b)
+    for r in range(rows):
+        for c in range(columns):
+            if bins[r, c] == _ROUGH_BINS * _OPEN_BINS:
+                bins[r, c] = -1
     return bins
 
 
 def estimate_background(cells: Cells) -> tuple[Background, NDArray[np.int16]]:
-    """Estimate the classes of a scene; also return the bin of each window at its centre cell (-1: no window)."""
-    bins = _window_bins(cells.height, cells.state, cells.openness)
+    """Estimate the classes of a scene; also return the bin of each cell's texture (-1: no window holds it)."""
+    bins = textures(cells.height, cells.state, cells.openness)
     held = bins >= 0
     counts = np.bincount(bins[held], minlength=_ROUGH_BINS * _OPEN_BINS).astype(np.float64)
     counts = counts.reshape(_ROUGH_BINS, _OPEN_BINS)
     rough = _LOG_LOW + (np.arange(_ROUGH_BINS) + 0.5) * (_LOG_HIGH - _LOG_LOW) / _ROUGH_BINS
-    windows = int(counts.sum())
-    pseudo = max(200.0, 0.1 * windows)
+    size_of_sample = int(counts.sum())
+    pseudo = max(200.0, 0.1 * size_of_sample)
     means = [math.log(_ROOF_ROUGH[0]), math.log(_CROWN_ROUGH[0])]
     spreads = [_ROOF_ROUGH[1], _CROWN_ROUGH[1]]
     opens = [np.array(_ROOF_OPEN), np.array(_CROWN_OPEN)]
@@ -134,7 +142,7 @@ def estimate_background(cells: Cells) -> tuple[Background, NDArray[np.int16]]:
             scatter = by_rough @ (rough - means[k]) ** 2 + pseudo * (width**2 + (math.log(centre) - means[k]) ** 2)
             spreads[k] = float(np.clip(math.sqrt(scatter / size), 0.4, 1.0))
             opens[k] = (weight.sum(axis=0) + pseudo * np.array((_ROOF_OPEN, _CROWN_OPEN)[k])) / size
-        share = float(np.clip(((counts * belongs).sum() + 100) / (windows + 200), 0.02, 0.98))
+        share = float(np.clip(((counts * belongs).sum() + 100) / (size_of_sample + 200), 0.02, 0.98))
     logs = [
         -0.5 * ((rough - mean) / spread)[:, None] ** 2 - math.log(spread) + np.log(opening)[None, :]
         for mean, spread, opening in zip(means, spreads, opens, strict=True)
@@ -155,7 +163,7 @@ def estimate_background(cells: Cells) -> tuple[Background, NDArray[np.int16]]:
         roof_roughness=math.exp(means[0]),
         crown_roughness=math.exp(means[1]),
         evidence=tuple(tuple(float(value) for value in row) for row in evidence),
-        windows=windows,
+        cells=size_of_sample,
     )
     return background, bins
 
@@ -180,7 +188,7 @@ def score_cells(
         As `estimate_background` returns them.
     background : Background
     texture_weight, texture_limit : float
-        Factor of the evidence (neighbouring windows share cells, so they are no independent witnesses), and the
+        Factor of the evidence (windows of neighbours share cells, so they are no independent witnesses), and the
         bound of its absolute value, nats.
     low_price, void_price : float
         Nats that a low and a void cell cost.
@@ -210,13 +218,7 @@ def _score(height, state, bins, evidence, mean, spread, fit_weight, thin, low_pr
             if state[r, c] == LOW:
                 score[r, c] = -low_price
             elif state[r, c] == HIGH:
-                best = -np.inf
-                for i in range(max(r - 1, 0), min(r + 2, rows)):
-                    for j in range(max(c - 1, 0), min(c + 2, columns)):
-                        if bins[i, j] >= 0:
-                            best = max(best, evidence[bins[i, j]])
-                if best == -np.inf:
-                    best = thin
+                best = evidence[bins[r, c]] if bins[r, c] >= 0 else thin
                 log_crown = level - 0.5 * ((0.01 * height[r, c] - mean) / spread) ** 2
                 score[r, c] = best - fit_weight * max(log_crown, _HEIGHT_FLOOR)
     return score

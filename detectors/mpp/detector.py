@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from ...scenes.footprints import Footprints
@@ -24,7 +25,7 @@ from ...scenes.raster import Elevation, Grid
 from ...scenes.scene import Scene
 from ..base import Detector
 from .annealing import Annealed, Schedule, anneal
-from .background import Background, estimate_background, score_cells
+from .background import Background, estimate_background, score_cells, textures
 from .candidates import propose_boxes
 from .cells import HIGH, Cells, cell_size, make_cells
 from .energy import Model, own_energy
@@ -33,8 +34,10 @@ from .polish import polish
 from .random_stream import stream
 from .rectangles import to_world
 from .roofs import KINDS, fit_roof
+from .superstructures import lower_superstructures
 from .tables import Tables, make_tables
 from .tiles import Tile, tiles_of, work_off
+from .walls import close_walls
 
 __all__ = ["MPP", "Prepared"]
 
@@ -93,16 +96,27 @@ class MPP(Detector):
     )
     overlap: float = parameter(20.0, unit="1/m2", minimum=0, doc="energy of common area (omega)", swept=(5, 20, 80))
     fit_weight: float = parameter(
-        0.3,
+        0.2,
         minimum=0,
         maximum=1,
         doc="independent height measurements per m2: neighbouring heights deviate from a roof together",
-        swept=(0.15, 0.3, 0.6, 1.0),
+        swept=(0.1, 0.2, 0.4, 1.0),
     )
     least_tau: float = parameter(
         0.15, unit="m", minimum=0.01, doc="least standard deviation of heights around a roof", swept=(0.1, 0.15, 0.3)
     )
+    outline: str = parameter(
+        "rectangles", choices=("rectangles", "blocks"), doc="one footprint a rectangle, or one a block of touching ones"
+    )
     roofs: str = parameter("all", choices=("all", "flat"), doc="plane, gable and hip roofs besides flat ones, or not")
+    roof_step: float = parameter(1.0, unit="m", minimum=0.1, doc="step between neighbouring cells that parts two roofs")
+    carried_share: float = parameter(
+        0.65,
+        minimum=0.5,
+        maximum=1.1,
+        doc="share of a roof's rim that lower roof must carry to make it a superstructure; above 1: none is one",
+        swept=(0.5, 0.65, 0.8, 1.1),
+    )
     roof_price: float = parameter(3.0, minimum=0, doc="energy per number that a roof has more than a flat one")
     texture_weight: float = parameter(
         1.0, minimum=0, doc="weight of roughness and multiple returns as evidence", swept=(0, 0.5, 1.0)
@@ -169,16 +183,13 @@ class MPP(Detector):
         low = 0.8 * self.least_height
         cells = make_cells(points, ground, grid, low=low, workers=pool, bands=self.workers)
         background, bins = estimate_background(cells)
-        score = score_cells(
-            cells,
-            bins,
-            background,
-            fit_weight=self.fit_weight,
-            texture_weight=self.texture_weight,
-            texture_limit=self.texture_limit,
-            low_price=self.low_price,
-            void_price=self.void_price,
-        )
+        score = self._score(cells, bins, background)
+        if self.carried_share <= 1:
+            height = lower_superstructures(
+                cells.height, cells.state, score > 0, step=self.roof_step, share=self.carried_share
+            )
+            cells = replace(cells, height=height)
+            score = self._score(cells, textures(cells.height, cells.state, cells.openness), background)
         tables = make_tables(cells.height, cells.state == HIGH, score)
         model = Model(
             weight=cell * cell,
@@ -202,6 +213,18 @@ class MPP(Detector):
             order = np.argsort(energies, kind="stable")
             boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
         return Prepared(cells, background, score, tables, model, boxes, weights)
+
+    def _score(self, cells: Cells, bins: NDArray[np.int16], background: Background) -> NDArray[np.float32]:
+        return score_cells(
+            cells,
+            bins,
+            background,
+            fit_weight=self.fit_weight,
+            texture_weight=self.texture_weight,
+            texture_limit=self.texture_limit,
+            low_price=self.low_price,
+            void_price=self.void_price,
+        )
 
     def _sample(self, prepared: Prepared, seed: int, pool: ThreadPoolExecutor) -> tuple[_Rectangles, list[Annealed]]:
         """Anneal every tile, then polish the seams."""
@@ -250,8 +273,9 @@ class MPP(Detector):
         rectangles = work_off(tiles, np.empty((0, 5)), annealed, reach=reach, workers=pool)
         if len(tiles) > 1:
             rectangles = work_off(tiles_of(grid, size, shifted=True), rectangles, mended, reach=reach, workers=pool)
-        order = np.lexsort(rectangles.T)
-        return rectangles[order], [results[key] for key in sorted(results)]
+        rectangles = np.ascontiguousarray(rectangles[np.lexsort(rectangles.T)])
+        close_walls(tables.small, tables.large, model, rectangles, 0.25 * self.price)
+        return rectangles, [results[key] for key in sorted(results)]
 
     def _footprints(
         self, prepared: Prepared, rectangles: _Rectangles, crs: str | None, record: dict[str, Any]
@@ -265,6 +289,8 @@ class MPP(Detector):
                 tables.small, tables.large, rectangle, price, model.least_tau, model.least_height, model.cell, fits[i]
             )
             energies[i] = own_energy(tables.small, tables.large, rectangle, model)
+        if self.outline == "blocks":
+            return _blocks(to_world(rectangles, prepared.cells.grid), 0.5 * prepared.cells.grid.gsd, crs, record)
         return Footprints.from_rectangles(
             to_world(rectangles, prepared.cells.grid),
             crs=crs,
@@ -278,6 +304,14 @@ class MPP(Detector):
             metadata=record,
             source=self.name,
         )
+
+
+def _blocks(corners: NDArray[np.float64], gap: float, crs: str | None, record: dict[str, Any]) -> Footprints:
+    """Return the union of rectangles that touch, or stand less than `gap` metres apart."""
+    rectangles = Footprints.from_rectangles(corners)
+    wide = shapely.buffer(rectangles.polygons, gap / 2, join_style="mitre")
+    union = shapely.buffer(shapely.union_all(wide), -gap / 2, join_style="mitre")
+    return Footprints.of(shapely.get_parts(union), crs=crs, metadata=record, source=MPP.name)
 
 
 def _joined_trace(results: list[Annealed]) -> dict[str, Any]:

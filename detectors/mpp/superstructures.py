@@ -1,0 +1,135 @@
+"""Superstructures: lift houses, plant rooms and towers that stand on a roof belong to the building below them.
+
+Nouns
+-----
+patch
+    Cells with the texture of a roof connected through steps no higher than a limit, and the rough cells between them
+    (walls, which have any height between two roofs, and furniture), which take the height of the roof beside them that
+    is nearer in height. Crowns belong to none.
+rim
+    The neighbours of a patch outside it, each counted as often as it touches: lower patch, higher patch, or none. Cells
+    without points (the shadow of a tower) do not count.
+superstructure
+    A patch whose rim is lower roof nearly all round. A house in a row is none: its front and back stand free.
+
+A superstructure is lowered to the roof around it before roofs are fitted, so that it neither spoils the fit nor is cut
+out as a building of its own. Towers on towers are lowered from the top down.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .candidates import label_patches
+from .cells import HIGH, VOID
+
+__all__ = ["lower_superstructures"]
+
+
+def lower_superstructures(
+    height: NDArray[np.int32],
+    state: NDArray[np.uint8],
+    roof: NDArray[np.bool_],
+    *,
+    step: float,
+    share: float,
+    rounds: int = 5,
+) -> NDArray[np.int32]:
+    """Return the heights with superstructures lowered to the roofs that carry them.
+
+    Parameters
+    ----------
+    height : ndarray of int32, shape (rows, columns)
+        Centimetres.
+    state : ndarray of uint8, shape (rows, columns)
+    roof : ndarray of bool, shape (rows, columns)
+        Cells whose texture is that of a roof.
+    step : float
+        Metres by which neighbouring cells of a patch differ at most.
+    share : float
+        Share of the rim that must be lower roof; more than 1 changes nothing.
+    rounds : int
+        Towers on towers that are lowered.
+    """
+    if share > 1:
+        return height
+    lowered = height.copy()
+    for turn in range(rounds):
+        labels, count = label_patches(lowered, roof, round(100 * step))
+        for _ in range(8 if turn == 0 else 0):
+            if not _smooth_walls(lowered, state, labels):
+                break
+        roof = labels > 0
+        if not _lower(lowered, state, labels, count, share):
+            break
+    return lowered
+
+
+@njit(cache=True, nogil=True)
+def _smooth_walls(height, state, labels):  # type: ignore[no-untyped-def]
+    """Give rough high cells between labelled ones the label and height of the neighbour nearest in height, in place.
+
+    A cell is taken when five of its eight neighbours are labelled, so that walls and furniture are eaten up from their
+    corners while the straight edge of a roof beside a crown stays. Return whether any cell was taken.
+    """
+    rows, columns = state.shape
+    before, level = labels.copy(), height.copy()
+    found = False
+    for r in range(1, rows - 1):
+        for c in range(1, columns - 1):
+            if before[r, c] != 0 or state[r, c] != HIGH:
+                continue
+            known, nearest, label, carrier = 0, np.int64(1) << 40, 0, 0
+            for i in range(r - 1, r + 2):
+                for j in range(c - 1, c + 2):
+                    if before[i, j] > 0:
+                        known += 1
+                        gap = abs(np.int64(level[i, j]) - level[r, c])
+                        if gap < nearest:
+                            nearest, label, carrier = gap, before[i, j], level[i, j]
+            if known >= 5:
+                labels[r, c], height[r, c] = label, carrier
+                found = True
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _lower(height, state, labels, count, share):  # type: ignore[no-untyped-def]
+    """Lower the superstructures in place to the lower half of the roof at their rim; return whether there was any.
+
+    Cells that a wall stands in have any height between two roofs, so the mean of the whole rim would be too high.
+    """
+    rows, columns = state.shape
+    rim = np.zeros(count + 1, dtype=np.int64)
+    below = np.zeros((2, count + 1), dtype=np.int64)
+    carried = np.zeros((2, count + 1), dtype=np.int64)
+    for half in range(2):
+        for r in range(rows):
+            for c in range(columns):
+                label = labels[r, c]
+                if label == 0:
+                    continue
+                for side in range(4):
+                    i = r + (1 if side == 0 else (-1 if side == 1 else 0))
+                    j = c + (1 if side == 2 else (-1 if side == 3 else 0))
+                    if i < 0 or j < 0 or i >= rows or j >= columns:
+                        rim[label] += 1 - half
+                    elif labels[i, j] != label and state[i, j] != VOID:
+                        rim[label] += 1 - half
+                        lower = labels[i, j] > 0 and height[i, j] < height[r, c]
+                        if lower and (half == 0 or height[i, j] <= carried[0, label]):
+                            below[half, label] += 1
+                            carried[half, label] += height[i, j]
+        for label in range(1, count + 1):
+            if below[half, label] > 0:
+                carried[half, label] = carried[half, label] // below[half, label]
+    found = False
+    for r in range(rows):
+        for c in range(columns):
+            label = labels[r, c]
+            if label > 0 and below[1, label] > 0 and below[0, label] >= share * rim[label]:
+                height[r, c] = min(height[r, c], carried[1, label])
+                found = True
+    return found
