@@ -14,8 +14,8 @@ texture
 evidence
     log p(texture | roof) - log p(texture | crown), nats.
 score
-    What a cell adds to a rectangle besides the fit of its roof: for a high cell, evidence - log p(height | crown); for
-    a low and for a void cell a fixed price.
+    What a cell adds to a rectangle besides the fit of its roof: for a high cell with evidence for a roof, evidence -
+    log p(height | crown); with evidence against it, the evidence; for a low and for a void cell a fixed price.
 
 Texture of the two classes is estimated from the scene by EM (expectation maximisation) on a histogram of cells, and
 held near what roofs and crowns are by pseudo-counts, so that a scene of roofs alone or of crowns alone keeps two
@@ -178,8 +178,11 @@ def score_cells(
     texture_limit: float,
     low_price: float,
     void_price: float,
-) -> NDArray[np.float32]:
-    """Return the score of each cell in nats, shape (rows, columns).
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return the score of each cell in nats, and whether its height takes part in the fit of a roof.
+
+    A high cell whose texture speaks against a roof (a wall, a chimney, a branch over the eaves) pays its evidence, but
+    does not spoil the fit: a Gaussian would let a few such cells outweigh a thousand good ones.
 
     Parameters
     ----------
@@ -212,6 +215,7 @@ def score_cells(
 def _score(height, state, bins, evidence, mean, spread, fit_weight, thin, low_price, void_price):  # type: ignore[no-untyped-def]
     rows, columns = state.shape
     score = np.full((rows, columns), -void_price, dtype=np.float32)
+    fitted = np.zeros((rows, columns), dtype=np.bool_)
     level = -math.log(spread * math.sqrt(2.0 * math.pi))
     for r in range(rows):
         for c in range(columns):
@@ -219,6 +223,10 @@ def _score(height, state, bins, evidence, mean, spread, fit_weight, thin, low_pr
                 score[r, c] = -low_price
             elif state[r, c] == HIGH:
                 best = evidence[bins[r, c]] if bins[r, c] >= 0 else thin
+                if best < 0.0:
+                    score[r, c] = best
+                    continue
+                fitted[r, c] = True
                 log_crown = level - 0.5 * ((0.01 * height[r, c] - mean) / spread) ** 2
                 score[r, c] = best - fit_weight * max(log_crown, _HEIGHT_FLOOR)
-    return score
+    return score, fitted

@@ -3,13 +3,14 @@
 Nouns
 -----
 roof cells
-    High cells whose score is positive.
+    High cells whose texture is that of a roof.
 patch
     Roof cells connected through steps no higher than a limit. Several limits are used: a low one parts houses of
     different height, no limit keeps a block together.
 box
-    Rectangle in the grid frame. Each patch is turned to the angle at which its bounding rectangle is smallest and
-    taken apart greedily into the largest rectangles that it fills (L, T, U shapes and rows give several).
+    Rectangle in the grid frame. Each patch is turned to the angle at which its bounding rectangle is smallest, gives
+    that rectangle if it fills enough of it, and is taken apart greedily into the largest rectangles that it fills (L,
+    T, U shapes and rows give several).
 """
 
 from __future__ import annotations
@@ -20,20 +21,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .cells import HIGH
-
 __all__ = ["label_patches", "propose_boxes"]
 
 #: Angles tried in a quarter turn.
 _ANGLES = 30
 #: Largest rectangles taken from one patch.
 _PIECES = 12
+#: A patch that fills this share of its bounding rectangle also gives that one: light wells and towers are holes in it.
+_FILLED = 0.85
 
 
 def propose_boxes(
     height: NDArray[np.int32],
-    state: NDArray[np.uint8],
-    score: NDArray[np.float32],
+    roof: NDArray[np.bool_],
     *,
     steps: tuple[float, ...],
     least_cells: int,
@@ -42,13 +42,14 @@ def propose_boxes(
 
     Parameters
     ----------
-    height, state, score : ndarray, shape (rows, columns)
+    height : ndarray of int32, shape (rows, columns)
+        Centimetres.
+    roof : ndarray of bool, shape (rows, columns)
     steps : tuple of float
         Limits in metres.
     least_cells : int
         Smaller patches and pieces are left out.
     """
-    roof = (state == HIGH) & (score > 0)
     found = [_boxes(*label_patches(height, roof, round(100 * step)), least_cells) for step in steps]
     boxes = np.concatenate(found) if found else np.empty((0, 5))
     return boxes[np.sort(np.unique(np.round(boxes, 3), axis=0, return_index=True)[1])]
@@ -101,7 +102,7 @@ def _boxes(labels, count, least_cells):  # type: ignore[no-untyped-def]
             if label > 0:
                 members[place[label], 0], members[place[label], 1] = r, c
                 place[label] += 1
-    boxes = np.empty((_PIECES * max(count, 1), 5))
+    boxes = np.empty(((_PIECES + 1) * max(count, 1), 5))
     n = 0
     for label in range(1, count + 1):
         cells = members[starts[label] : starts[label + 1]]
@@ -132,7 +133,7 @@ def _best_angle(cells):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _take_apart(cells, least_cells, boxes, n):  # type: ignore[no-untyped-def]
-    """Append the largest filled rectangles of a patch, one after the other, until what is left is small."""
+    """Append the bounding and the largest filled rectangles of a patch, until what is left is small."""
     angle = _best_angle(cells)
     cos, sin = math.cos(angle), math.sin(angle)
     low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
@@ -140,6 +141,12 @@ def _take_apart(cells, least_cells, boxes, n):  # type: ignore[no-untyped-def]
         x, y = cells[i, 1] + 0.5, cells[i, 0] + 0.5
         u, v = x * cos + y * sin, y * cos - x * sin
         low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, v), max(high_v, v)
+    wide, high = high_u - low_u + 0.8, high_v - low_v + 0.8
+    if len(cells) > _FILLED * wide * high:
+        u, v = 0.5 * (low_u + high_u), 0.5 * (low_v + high_v)
+        boxes[n, 0], boxes[n, 1] = u * cos - v * sin, u * sin + v * cos
+        boxes[n, 2], boxes[n, 3], boxes[n, 4] = wide, high, angle
+        n += 1
     width, tall = int(high_u - low_u) + 3, int(high_v - low_v) + 3
     # Cells set four places each, so that a turned grid has no holes.
     full = np.zeros((tall, width), dtype=np.bool_)

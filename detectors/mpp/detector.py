@@ -27,7 +27,7 @@ from ..base import Detector
 from .annealing import Annealed, Schedule, anneal
 from .background import Background, estimate_background, score_cells, textures
 from .candidates import propose_boxes
-from .cells import HIGH, Cells, cell_size, make_cells
+from .cells import Cells, cell_size, make_cells
 from .energy import Model, own_energy
 from .moves import MOVES
 from .polish import polish
@@ -183,14 +183,14 @@ class MPP(Detector):
         low = 0.8 * self.least_height
         cells = make_cells(points, ground, grid, low=low, workers=pool, bands=self.workers)
         background, bins = estimate_background(cells)
-        score = self._score(cells, bins, background)
+        score, fitted = self._score(cells, bins, background)
         if self.carried_share <= 1:
             height = lower_superstructures(
-                cells.height, cells.state, score > 0, step=self.roof_step, share=self.carried_share
+                cells.height, cells.state, fitted, step=self.roof_step, share=self.carried_share
             )
             cells = replace(cells, height=height)
-            score = self._score(cells, textures(cells.height, cells.state, cells.openness), background)
-        tables = make_tables(cells.height, cells.state == HIGH, score)
+            score, fitted = self._score(cells, textures(cells.height, cells.state, cells.openness), background)
+        tables = make_tables(cells.height, fitted, score)
         model = Model(
             weight=cell * cell,
             price=self.price,
@@ -206,15 +206,15 @@ class MPP(Detector):
         )
         boxes, weights = np.empty((0, 5)), np.empty(0)
         if self.data_births > 0 or self.start == "greedy":
-            boxes = propose_boxes(
-                cells.height, cells.state, score, steps=(0.4, 1.0, 1000.0), least_cells=math.ceil(6 / cell**2)
-            )
+            boxes = propose_boxes(cells.height, fitted, steps=(0.4, 1.0, 1000.0), least_cells=math.ceil(6 / cell**2))
             energies = np.array([own_energy(tables.small, tables.large, box, model) for box in boxes])
             order = np.argsort(energies, kind="stable")
             boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
         return Prepared(cells, background, score, tables, model, boxes, weights)
 
-    def _score(self, cells: Cells, bins: NDArray[np.int16], background: Background) -> NDArray[np.float32]:
+    def _score(
+        self, cells: Cells, bins: NDArray[np.int16], background: Background
+    ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         return score_cells(
             cells,
             bins,
