@@ -50,7 +50,7 @@ def gate_figure(result: GateResult) -> Figure:
                 axes.plot(verdict.effect / unit, place, marker=marker, color=colour, markersize=6.5, linestyle="none")
         axes.set_yticks(range(len(mine)), [f"{verdict.index.title}: {verdict.verdict}" for verdict in mine])
         axes.set_ylim(len(mine) - 0.4, -0.6)
-        axes.set_xlabel("mean paired difference / margin, positive is better; bars: 95 %")
+        axes.set_xlabel("mean paired difference in margins\n(positive is better; bars: 95 %)")
     return figure
 
 

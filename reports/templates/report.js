@@ -151,7 +151,7 @@ class Viewer {
     scene.overlays.forEach((overlay, place) => {
       const group = shape("g", { "data-overlay": place });
       this.append(group, place, "references", scene.paths, overlay.references, ["FN", "left out"]);
-      this.append(group, place, "detections", overlay.paths, overlay.detections, [...SHOWN, "left out"]);
+      this.append(group, place, "detections", overlay.paths, overlay.detections, ["left out", ...SHOWN]);
       layers.shapes.append(group);
     });
     byId("shows").textContent = [scene.shows, `${(scene.width * UNIT).toFixed(0)} × ${(scene.height * UNIT).toFixed(0)} m`]
@@ -161,13 +161,15 @@ class Viewer {
   }
 
   append(group, place, side, paths, rows, wanted) {
-    paths.forEach((d, position) => {
-      const verdict = rows.verdicts[position];
-      if (!wanted.includes(verdict)) return;
-      const path = shape("path", { d, class: "shape", "data-verdict": verdict, "data-side": side, "data-position": position });
-      paint(path, verdict, DASHES[place % DASHES.length]);
-      group.append(path);
-    });
+    // One verdict after the other, so that what is wrong lies on top.
+    for (const verdict of wanted) {
+      paths.forEach((d, position) => {
+        if (rows.verdicts[position] !== verdict) return;
+        const path = shape("path", { d, class: "shape", "data-verdict": verdict, "data-side": side, "data-position": position });
+        paint(path, verdict, DASHES[place % DASHES.length]);
+        group.append(path);
+      });
+    }
   }
 
   toggles() {
