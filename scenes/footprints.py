@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import InputError
 from .vector_columns import labels_of
 
-__all__ = ["Footprints", "Repair"]
+__all__ = ["Footprints", "Repair", "polygonal_part"]
 
 #: Stands for "number the rows from 0".
 _UNNUMBERED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
@@ -295,7 +295,7 @@ def _mend(
         problem = "a collection of geometries" if collection else shapely.is_valid_reason(geometries[row])
         # "structure" joins overlapping parts; "linework" would make holes where they overlap.
         mended = shapely.make_valid(geometries[row], method="structure", keep_collapsed=False)
-        geometries[row] = _polygonal_part(mended)
+        geometries[row] = polygonal_part(mended)
         usable = not geometries[row].is_empty
         repairs.append(Repair(int(row), problem, "mended" if usable else "left out"))
         kept[row] = usable
@@ -308,6 +308,15 @@ def _mend(
     return geometries[kept], tuple(repairs), kept
 
 
-def _polygonal_part(geometry: Any) -> Any:
+def polygonal_part(geometry: shapely.Geometry) -> shapely.Geometry:
+    """Return what has area in a geometry; an empty multipolygon where nothing has.
+
+    Examples
+    --------
+    >>> mixed = shapely.GeometryCollection([shapely.box(0, 0, 1, 1), shapely.LineString([(1, 1), (2, 2)])])
+    >>> polygonal_part(mixed).geom_type, polygonal_part(shapely.Point(0, 0)).wkt
+    ('Polygon', 'MULTIPOLYGON EMPTY')
+    """
     parts = shapely.get_parts(shapely.get_parts(geometry))
-    return shapely.union_all([part for part in parts if part.geom_type == "Polygon"])
+    polygons = parts[shapely.get_type_id(parts) == 3]
+    return shapely.union_all(polygons) if len(polygons) else shapely.MultiPolygon()

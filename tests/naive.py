@@ -89,7 +89,8 @@ def evaluate(detected, reference, building=None, *, matching="nearest", area=Non
         cross_lapped += len(own) > 1
 
     def clip(polygon):
-        return polygon if area is None else polygon.intersection(area)
+        # An empty buffer leaves out the lines and points where the polygon only touches the area.
+        return polygon if area is None else polygon.intersection(area).buffer(0)
 
     pairs = [(clip(detected[d]), clip(reference[r])) for d, r in matches.items()]
     true = shapely.union_all([one.intersection(two) for one, two in pairs])

@@ -65,3 +65,25 @@ def random_detections(rng, reference):
         x, y = rng.uniform(0, 60, 2)
         detected.append(rectangle(x, y, rng.uniform(2, 8), rng.uniform(2, 8), rng.uniform(0, 3)))
     return [detected[k] for k in rng.permutation(len(detected))]
+
+
+def footprints_on_a_lattice(rng, count):
+    """Return footprints at half metres: edges that coincide, courtyards with a house in them, pieces, duplicates."""
+    polygons = []
+    for _ in range(count):
+        x, y = np.round(rng.uniform(0, 40, 2) * 2) / 2
+        width, depth = rng.integers(2, 16, 2)
+        whole = shapely.box(x, y, x + width, y + depth)
+        court = shapely.box(x + width / 4, y + depth / 4, x + 3 * width / 4, y + 3 * depth / 4)
+        kind = rng.choice(["plain", "courtyard", "pieces", "nest", "duplicate"], p=[0.35, 0.15, 0.15, 0.15, 0.2])
+        if kind == "courtyard":
+            polygons.append(whole - court)
+        elif kind == "pieces":
+            polygons.append(whole | shapely.box(x + width + 3, y, x + width + 6, y + 4))
+        elif kind == "nest":
+            polygons.append((whole - court) | affinity.scale(court, 0.5, 0.5))
+        elif kind == "duplicate" and polygons:
+            polygons.append(polygons[rng.integers(len(polygons))])
+        else:
+            polygons.append(whole)
+    return polygons

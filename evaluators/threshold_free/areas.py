@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ...scenes.footprints import Footprints
 from .convex import convex_intersection_areas
-from .overlap import Overlaps, quadrilateral_rows
+from .overlap import Overlaps, common_ground, quadrilateral_rows
 
 __all__ = ["AreaTally", "exact_areas"]
 
@@ -87,10 +87,7 @@ def exact_areas(
     pair_conflicts = _pair_conflicts(detected, reference, pairs, conflicts)
 
     def pair_ground(group: list[int]) -> NDArray[np.object_]:
-        common: NDArray[np.object_] = shapely.intersection(
-            detected.polygons[detections[group]], reference.polygons[references[group]]
-        )
-        return common
+        return common_ground(detected.polygons[detections[group]], reference.polygons[references[group]])
 
     true_positive = _union_area(shared, pair_conflicts, pair_ground)
     beyond = []
@@ -159,7 +156,7 @@ def _shared_by_four(rows: list[tuple[Footprints, NDArray[np.int64]]]) -> NDArray
     common = None
     for footprints, index in rows:
         polygons = footprints.polygons[index[~quick]]
-        common = polygons if common is None else shapely.intersection(common, polygons)
+        common = polygons if common is None else common_ground(common, polygons)
     areas[~quick] = shapely.area(common)
     return areas
 

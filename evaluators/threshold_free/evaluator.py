@@ -26,7 +26,7 @@ from .areas import AreaTally, exact_areas
 from .correspondence import MATCHINGS, Correspondence, match
 from .geometric import pair_distances
 from .indices import COUNTS, INDICES, index_values
-from .overlap import Overlaps, overlaps_between, overlaps_within, shared_areas
+from .overlap import Overlaps, common_ground, overlaps_between, overlaps_within, shared_areas
 from .pixels import pixel_areas
 from .verdicts import ObjectGraph, verdict_tables
 
@@ -370,7 +370,7 @@ def _clipped(footprints: Footprints, area: shapely.Geometry) -> Footprints:
     """Return the footprints cut at the evaluation area; those outside become empty."""
     crossing = ~shapely.contains_properly(area, footprints.polygons)
     inside = footprints.polygons.copy()
-    inside[crossing] = shapely.intersection(inside[crossing], area)
+    inside[crossing] = common_ground(inside[crossing], area)
     return Footprints(polygons=inside, crs=footprints.crs, source=footprints.source)
 
 

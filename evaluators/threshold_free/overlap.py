@@ -13,10 +13,18 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...scenes.footprints import Footprints
+from ...scenes.footprints import Footprints, polygonal_part
 from .convex import convex_intersection_areas
 
-__all__ = ["NUMERICAL_ZERO", "Overlaps", "overlaps_between", "overlaps_within", "quadrilateral_rows", "shared_areas"]
+__all__ = [
+    "NUMERICAL_ZERO",
+    "Overlaps",
+    "common_ground",
+    "overlaps_between",
+    "overlaps_within",
+    "quadrilateral_rows",
+    "shared_areas",
+]
 
 #: Share of the smaller area up to which an intersection is rounding (evaluation.md, section 1).
 NUMERICAL_ZERO = 1e-6
@@ -89,6 +97,17 @@ def shared_areas(
         slow = np.flatnonzero(~convex[part]) + start
         areas[slow] = shapely.area(shapely.intersection(one.polygons[first[slow]], two.polygons[second[slow]]))
     return areas
+
+
+def common_ground(one: NDArray[np.object_], two: NDArray[np.object_] | shapely.Geometry) -> NDArray[np.object_]:
+    """Return the ground that polygons share, without the lines and points where they only touch.
+
+    Overlaying a polygon with such a mixture is an error in GEOS.
+    """
+    common: NDArray[np.object_] = shapely.intersection(one, two)
+    for row in np.flatnonzero(~np.isin(shapely.get_type_id(common), (3, 6))):
+        common[row] = polygonal_part(common[row])
+    return common
 
 
 def quadrilateral_rows(footprints: Footprints) -> NDArray[np.int64]:

@@ -4,7 +4,7 @@ import naive
 import numpy as np
 import pytest
 import shapely
-from random_sets import random_detections, random_reference
+from random_sets import footprints_on_a_lattice, random_detections, random_reference
 
 import roofbench as rb
 from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
@@ -52,6 +52,32 @@ def test_evaluation_area_and_minimum_size_are_as_defined(seed):
     evaluation = evaluator.evaluate(footprints(detected), footprints(reference, building), area=area)
     expected = naive.evaluate(detected, reference, building, area=area, minimum_area=evaluator.minimum_area)
     assert_same(evaluation, expected)
+
+
+@pytest.mark.parametrize("matching", ["nearest", "one-pass", "overlap"])
+def test_footprints_that_touch_the_evaluation_area_and_each_other_are_cut_cleanly(matching):
+    area = shapely.box(5, 5, 35, 35) - shapely.box(15, 15, 22, 22)
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        detected, reference = (footprints_on_a_lattice(rng, rng.integers(0, 9)) for _ in range(2))
+        building = rng.integers(0, 4, len(reference)).tolist()
+        evaluator = ThresholdFree(matching=matching, minimum_area=30.0 if seed % 5 == 0 else 0.0)
+        evaluation = evaluator.evaluate(footprints(detected), footprints(reference, building), area=area)
+        expected = naive.evaluate(
+            detected, reference, building, matching=matching, area=area, minimum_area=evaluator.minimum_area
+        )
+        assert_same(evaluation, expected)
+
+
+def test_a_house_along_the_border_of_the_evaluation_area_may_overlap_one_beyond_it():
+    # Cut at x = 20, the L is a rectangle and a line, and its neighbour is nothing.
+    corner_house = shapely.box(10, 5, 22, 10) | shapely.box(20, 10, 22, 15)
+    beyond = shapely.box(21, 5, 30, 20)
+    evaluation = ThresholdFree().evaluate(
+        footprints([corner_house, beyond]), footprints([corner_house, beyond]), area=shapely.box(0, 0, 20, 20)
+    )
+    assert evaluation.counts.true_positives == 1
+    assert evaluation.tallies["areas.true_positive"] == pytest.approx(50)
 
 
 @pytest.mark.parametrize("seed", range(30))
