@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from shapely import Geometry
+from shapely import Geometry, MultiPolygon, Polygon, is_valid, is_valid_reason
 
+from ..scenes.crs import require_metric
 from ..scenes.errors import InputError
 from ..scenes.footprints import Footprints
 from ..scenes.raster import Grid
@@ -43,8 +44,10 @@ def evaluate(
 
     Raises
     ------
+    InputError
+        What is given as detected, reference or area is no footprint set or no valid polygon.
     CRSError
-        The two sets have no common CRS.
+        The two sets have no common CRS, or it is not in metres.
     ParameterError, UnknownNameError
         No such evaluator or parameter.
 
@@ -57,7 +60,30 @@ def evaluate(
     >>> evaluation.object.completeness, evaluation.geometric.rmse
     (0.5, 1.0)
     """
-    return make_evaluator(evaluator, parameters).evaluate(detected, reference, area=area, grid=grid)
+    for footprints, role in ((detected, "detected"), (reference, "reference")):
+        if not isinstance(footprints, Footprints):
+            raise InputError(
+                f"{role} is {type(footprints).__name__}, not Footprints: read it with read_footprints or build it by "
+                "Footprints.of"
+            )
+        if len(footprints):
+            require_metric(footprints.crs, footprints.source, heights=False)
+    judge = make_evaluator(evaluator, parameters)
+    if area is not None:
+        _require_polygon(area, judge)
+    return judge.evaluate(detected, reference, area=area, grid=grid)
+
+
+def _require_polygon(area: Any, judge: Evaluator) -> None:
+    what = "area is the polygon inside which the reference is complete"
+    if isinstance(area, str):
+        raise InputError(
+            f"{what}, not {area!r}: how areas are measured is chosen by evaluator='{judge.name}[area={area}]'"
+        )
+    if not isinstance(area, Polygon | MultiPolygon):
+        raise InputError(f"{what}, not {type(area).__name__}: give a shapely Polygon or MultiPolygon")
+    if not is_valid(area):
+        raise InputError(f"{what}, but it is invalid ({is_valid_reason(area)}): mend it with shapely.make_valid")
 
 
 def pool(evaluations: Iterable[Evaluation]) -> Evaluation:

@@ -1,0 +1,35 @@
+"""``roofbench.evaluate`` refuses what it cannot compare, in one sentence."""
+
+import pytest
+import shapely
+
+import roofbench as rb
+from roofbench.scenes.errors import CRSError, InputError
+
+HOUSE = shapely.box(0, 0, 10, 10)
+HOUSES = rb.Footprints.of([HOUSE])
+
+WRONG_AREAS = {
+    "a way to measure areas": ("pixels", r"evaluator='threshold-free\[area=pixels\]'"),
+    "a line": (shapely.LineString([(0, 0), (10, 10)]), "not LineString"),
+    "a bow tie": (shapely.Polygon([(0, 0), (20, 20), (20, 0), (0, 20)]), "Self-intersection"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_AREAS)
+def test_an_area_that_is_no_valid_polygon_is_refused(case):
+    area, message = WRONG_AREAS[case]
+    with pytest.raises(InputError, match=message):
+        rb.evaluate(HOUSES, HOUSES, area=area)
+
+
+@pytest.mark.parametrize(("crs", "message"), [("EPSG:4326", "geographic"), ("EPSG:2263", "US survey foot")])
+def test_a_crs_that_is_not_in_metres_is_refused(crs, message):
+    houses = rb.Footprints.of([HOUSE], crs=crs)
+    with pytest.raises(CRSError, match=message):
+        rb.evaluate(houses, houses)
+
+
+def test_a_list_of_polygons_is_no_footprint_set():
+    with pytest.raises(InputError, match=r"reference is list, not Footprints: .* Footprints\.of"):
+        rb.evaluate(HOUSES, [HOUSE])
