@@ -192,6 +192,7 @@ class ThresholdFree(Evaluator):
             counted_references,
             (detection_reason, reference_reason),
             distances_of_pairs.outline,
+            _duplicates(correspondence, within_detected.only_significant),
         )
         samples = {"iou": _pair_iou(detected, reference, usable, correspondence)}
         evaluation = self.summarise(tallies, samples, list(_repair_notes(detected, reference)))
@@ -273,6 +274,17 @@ def _counted_detections(
     if area is not None:
         reason[unmatched & ~_centres_inside(detected, area)] = _OUTSIDE
     return reason == "", reason
+
+
+def _duplicates(correspondence: Correspondence, within: Overlaps) -> NDArray[np.bool_]:
+    """Return the multiple detections that overlap the detection which stands for their reference."""
+    multiple = (correspondence.of_detection < 0) & (correspondence.booked_on >= 0)
+    holder = np.full(len(multiple), -1, dtype=np.int64)
+    holder[multiple] = correspondence.of_reference[correspondence.booked_on[multiple]]
+    duplicates = np.zeros(len(multiple), dtype=bool)
+    for own, other in ((within.first, within.second), (within.second, within.first)):
+        duplicates[own[holder[own] == other]] = True
+    return duplicates
 
 
 def _counts(

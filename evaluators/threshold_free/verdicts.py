@@ -41,6 +41,8 @@ class ObjectGraph:
         Why, for detections and references; empty where counted.
     pair_outline : ndarray, shape (number of TP pairs,)
         Outline distance of each TP pair, by detection, m.
+    duplicates : ndarray of bool
+        The multiple detections that overlap the detection which stands for their reference; the others are pieces.
     """
 
     detected: Footprints
@@ -52,6 +54,7 @@ class ObjectGraph:
     counted_references: NDArray[np.bool_]
     left_out_reason: tuple[NDArray[np.object_], NDArray[np.object_]]
     pair_outline: NDArray[np.float64]
+    duplicates: NDArray[np.bool_]
 
 
 class _Neighbours:
@@ -89,6 +92,7 @@ def verdict_tables(graph: ObjectGraph) -> Verdicts:
     of_detection = _Neighbours(pairs.first, pairs.second, graph.distances, len(graph.detected))
     of_reference = _Neighbours(pairs.second, pairs.first, graph.distances, len(graph.reference))
     pair_of_match = _matched_positions(pairs, match)
+    claims = _Claims.of(graph)
     detections, references = match.pairs
     rmse = np.full(len(graph.detected), np.nan)
     rmse[detections] = graph.pair_outline
@@ -100,7 +104,7 @@ def verdict_tables(graph: ObjectGraph) -> Verdicts:
     verdict = np.where(matched, "TP", np.where(of_detection.count > 0, "MD", "FP")).astype(object)
     verdict[~graph.counted_detections] = "left out"
     table_d = _table(graph.detected, verdict, position, pairs.second, graph.reference, graph, rmse)
-    table_d["reason"] = _detection_reasons(graph, verdict, of_detection, of_reference, table_d["distance"].to_numpy())
+    table_d["reason"] = _detection_reasons(graph, verdict, of_detection, claims, table_d["distance"].to_numpy())
 
     matched = match.of_reference >= 0
     own_pair = np.full(len(graph.reference), -1, dtype=np.int64)
@@ -109,7 +113,7 @@ def verdict_tables(graph: ObjectGraph) -> Verdicts:
     verdict = np.where(matched, "TP", "FN").astype(object)
     verdict[~graph.counted_references] = "left out"
     table_r = _table(graph.reference, verdict, position, pairs.first, graph.detected, graph, rmse_reference)
-    table_r["reason"] = _reference_reasons(graph, verdict, of_detection, of_reference, table_r["distance"].to_numpy())
+    table_r["reason"] = _reference_reasons(graph, table_r, of_detection, of_reference, claims)
     for table, footprints in ((table_d, graph.detected), (table_r, graph.reference)):
         table["geometry"] = footprints.polygons
     return Verdicts(table_d, table_r)
@@ -143,7 +147,7 @@ def _table(
     shared = graph.overlaps.area[pair]
     numbers["overlap_area"][has] = shared
     united = footprints.areas[has] + others.areas[other_rows[pair]] - shared
-    numbers["iou"][has] = shared / united
+    numbers["iou"][has] = np.minimum(shared / united, 1.0)
     columns = {
         "id": footprints.ids,
         "verdict": verdict,
@@ -163,82 +167,129 @@ def _names(footprints: Footprints, rows: list[int]) -> str:
     return " and ".join([", ".join(ids[:-1]), ids[-1]] if len(ids) > 1 else ids)
 
 
+def _share(part: float) -> str:
+    return f"{100 * part:.0f} %" if part >= 0.01 else "less than 1 %"
+
+
+@dataclass(frozen=True, eq=False)
+class _Claims:
+    """How often each reference is detected.
+
+    Attributes
+    ----------
+    pieces : list of int
+        Detections that stand for a reference or are pieces of it: more than one when it is split.
+    times : list of int
+        Detections that stand for it or duplicate that one: more than one when it is detected again.
+    home : list of int
+        For each detection the reference that it is matched with or booked on, or -1.
+    """
+
+    pieces: list[int]
+    times: list[int]
+    home: list[int]
+
+    @classmethod
+    def of(cls, graph: ObjectGraph) -> _Claims:
+        match = graph.correspondence
+        multiple = graph.counted_detections & (match.of_detection < 0) & (match.booked_on >= 0)
+        found = (match.of_reference >= 0).astype(np.int64)
+
+        def booked(kind: NDArray[np.bool_]) -> list[int]:
+            numbers: list[int] = np.bincount(match.booked_on[multiple & kind], minlength=len(found)).tolist()
+            return numbers
+
+        home = np.where(match.of_detection >= 0, match.of_detection, match.booked_on)
+        return cls(
+            [own + more for own, more in zip(found.tolist(), booked(~graph.duplicates), strict=True)],
+            [own + more for own, more in zip(found.tolist(), booked(graph.duplicates), strict=True)],
+            home.tolist(),
+        )
+
+    def told(self, reference: int, subject: str = "") -> str:
+        text = f"; {subject}split into {self.pieces[reference]} detections" if self.pieces[reference] > 1 else ""
+        return text + (f"; {subject}detected {self.times[reference]} times" if self.times[reference] > 1 else "")
+
+
 def _detection_reasons(
     graph: ObjectGraph,
     verdict: NDArray[np.object_],
     of_detection: _Neighbours,
-    of_reference: _Neighbours,
+    claims: _Claims,
     distance: NDArray[np.float64],
 ) -> list[str]:
-    match = graph.correspondence
     reference_ids, detection_ids = graph.reference.ids.tolist(), graph.detected.ids.tolist()
-    claims = of_reference.count.tolist()
-    touched = of_detection.count.tolist()
-    partner, booked = match.of_detection.tolist(), match.booked_on.tolist()
-    holder = match.of_reference.tolist()
+    touched, duplicates = of_detection.count.tolist(), graph.duplicates.tolist()
+    holder = graph.correspondence.of_reference.tolist()
     reasons = []
     for row, (what, moved) in enumerate(zip(verdict.tolist(), distance.tolist(), strict=True)):
         if what == "FP":
             reasons.append("false alarm: overlaps no reference")
-        elif what == "left out":
+            continue
+        if what == "left out":
             reasons.append(str(graph.left_out_reason[0][row]))
-        elif what == "TP":
-            mine = partner[row]
-            text = f"found reference {reference_ids[mine]}, shifted {moved:.1f} m"
-            if touched[row] > 1:
-                others = [other for other in of_detection.of(row) if other != mine]
-                text += f"; also covers part of reference {_names(graph.reference, others)}"
-            if claims[mine] > 1:
-                text += f"; the reference is split into {claims[mine]} detections"
-            reasons.append(text)
+            continue
+        mine = claims.home[row]
+        if what == "TP":
+            text = f"found reference {reference_ids[mine]}, shifted {moved:.1f} m" + claims.told(
+                mine, "the reference is "
+            )
+        elif duplicates[row]:
+            text = f"duplicate of detection {detection_ids[holder[mine]]} on reference {reference_ids[mine]}"
         else:
-            mine = booked[row]
-            first = holder[mine]
-            if first >= 0:
-                text = f"duplicate of detection {detection_ids[first]} on reference {reference_ids[mine]}"
-            else:
-                text = f"overlaps reference {reference_ids[mine]} without being its nearest claimant"
-            if claims[mine] > 1:
-                text += f", which is split into {claims[mine]} detections"
-            if touched[row] > 1:
-                others = [other for other in of_detection.of(row) if other != mine]
-                text += f"; also covers part of reference {_names(graph.reference, others)}"
-            reasons.append(text)
+            text = (
+                f"piece of reference {reference_ids[mine]}, which is split into {claims.pieces[mine]} detections and "
+                f"represented by detection {detection_ids[holder[mine]]}"
+            )
+        if touched[row] > 1:
+            others = [other for other in of_detection.of(row) if other != mine]
+            text += f"; also covers part of reference {_names(graph.reference, others)}"
+        reasons.append(text)
     return reasons
 
 
 def _reference_reasons(
     graph: ObjectGraph,
-    verdict: NDArray[np.object_],
+    table: pd.DataFrame,
     of_detection: _Neighbours,
     of_reference: _Neighbours,
-    distance: NDArray[np.float64],
+    claims: _Claims,
 ) -> list[str]:
     match = graph.correspondence
     reference_ids, detection_ids = graph.reference.ids.tolist(), graph.detected.ids.tolist()
     partner, holds = match.of_reference.tolist(), match.of_detection.tolist()
-    claims, touched = of_reference.count.tolist(), of_detection.count.tolist()
+    overlapping, touched = of_reference.count.tolist(), of_detection.count.tolist()
+    covered = (table["overlap_area"].to_numpy() / graph.reference.areas).tolist()
     reasons = []
-    for row, (what, moved) in enumerate(zip(verdict.tolist(), distance.tolist(), strict=True)):
+    for row, (what, moved) in enumerate(zip(table["verdict"].tolist(), table["distance"].tolist(), strict=True)):
         if what == "left out":
             reasons.append(str(graph.left_out_reason[1][row]))
         elif what == "TP":
             mine = partner[row]
-            text = f"found by detection {detection_ids[mine]}, shifted {moved:.1f} m"
-            if claims[row] > 1:
-                text += f"; split into {claims[row]} detections"
+            text = f"found by detection {detection_ids[mine]}, shifted {moved:.1f} m" + claims.told(row)
             if touched[mine] > 1:
                 others = [other for other in of_detection.of(mine) if other != row]
                 text += f"; the detection also covers part of reference {_names(graph.reference, others)}"
+            if overlapping[row] > claims.pieces[row] + claims.times[row] - 1:
+                others = [other for other in of_reference.of(row) if claims.home[other] != row]
+                names = _names(graph.detected, others)
+                text += (
+                    f"; detection {names} of another reference covers part of it"
+                    if len(others) == 1
+                    else f"; detections {names} of other references cover parts of it"
+                )
             reasons.append(text)
-        elif claims[row] == 0:
+        elif overlapping[row] == 0:
             reasons.append("missed: no detection overlaps it")
         else:
             nearest = of_reference.of(row)[0]
-            other = holds[nearest]
-            if other >= 0:
-                text = f"merged with reference {reference_ids[other]} into detection {detection_ids[nearest]}"
+            name, share = detection_ids[nearest], _share(covered[row])
+            if holds[nearest] >= 0:
+                other = reference_ids[holds[nearest]]
+                text = f"merged with reference {other} into detection {name}, which covers {share} of it"
             else:
-                text = f"missed: detection {detection_ids[nearest]} overlaps it but is booked elsewhere"
+                # Only where a detection has a single choice (one-pass matching).
+                other = reference_ids[claims.home[nearest]]
+                text = f"missed: detection {name} overlaps it ({share}) but is booked on reference {other}"
             reasons.append(text)
     return reasons

@@ -40,17 +40,42 @@ def test_a_false_alarm_and_a_missed_building_have_no_partner():
 def test_two_houses_in_one_detection_are_merged():
     found = verdicts([shapely.box(0, 0, 20, 10)], [house(0, width=9), house(11, width=9)])
     assert found.references["verdict"].tolist() == ["TP", "FN"]
-    assert found.references.loc[1, "reason"] == "merged with reference 0 into detection 0"
+    assert found.references.loc[1, "reason"] == "merged with reference 0 into detection 0, which covers 100 % of it"
     assert "also covers part of reference 1" in found.detections.loc[0, "reason"]
 
 
 def test_a_house_in_three_pieces_is_split():
     found = verdicts([house(0, width=3), house(3.5, width=3), house(7, width=3)], [house(0)])
     assert found.detections["verdict"].tolist() == ["MD", "TP", "MD"]
-    assert (
-        found.detections.loc[0, "reason"] == "duplicate of detection 1 on reference 0, which is split into 3 detections"
-    )
-    assert found.references.loc[0, "reason"].endswith("split into 3 detections")
+    piece = "piece of reference 0, which is split into 3 detections and represented by detection 1"
+    assert found.detections["reason"].tolist() == [piece, found.detections.loc[1, "reason"], piece]
+    assert found.detections.loc[1, "reason"].endswith("; the reference is split into 3 detections")
+    assert found.references.loc[0, "reason"].endswith("; split into 3 detections")
+
+
+def test_a_house_found_twice_is_not_split_but_has_a_duplicate():
+    found = verdicts([house(1), house(0)], [house(0)])
+    assert found.detections["reason"].tolist() == [
+        "duplicate of detection 1 on reference 0",
+        "found reference 0, shifted 0.0 m; the reference is detected 2 times",
+    ]
+    assert found.references.loc[0, "reason"] == "found by detection 1, shifted 0.0 m; detected 2 times"
+
+
+def test_a_shifted_row_is_not_told_to_be_split():
+    found = verdicts([house(1), house(11), house(21)], [house(0), house(10), house(20)])
+    assert not found.detections["reason"].str.contains("split").any()
+    assert found.references["reason"].tolist() == [
+        "found by detection 0, shifted 1.0 m; the detection also covers part of reference 1",
+        "found by detection 1, shifted 1.0 m; the detection also covers part of reference 2"
+        "; detection 0 of another reference covers part of it",
+        "found by detection 2, shifted 1.0 m; detection 1 of another reference covers part of it",
+    ]
+
+
+def test_a_missed_house_that_a_neighbour_grazes_says_how_little_is_covered():
+    found = verdicts([house(0, width=10.2)], [house(0), house(10.15)])
+    assert found.references.loc[1, "reason"].endswith("into detection 0, which covers less than 1 % of it")
 
 
 def test_objects_are_named_by_their_row_in_the_source():
@@ -94,4 +119,6 @@ def test_one_pass_matching_leaves_a_reference_that_sweeping_finds():
     literal = rb.evaluate(rb.Footprints.of(detected), rb.Footprints.of(reference), matching="one-pass")
     assert swept.counts.true_positives == 2
     assert literal.counts.true_positives == 1
-    assert literal.verdicts.references.loc[1, "reason"].startswith("missed: detection 1 overlaps it")
+    assert literal.verdicts.references.loc[1, "reason"] == (
+        "missed: detection 1 overlaps it (25 %) but is booked on reference 0"
+    )
