@@ -87,19 +87,27 @@ def adjust_to_shape(
         Largest rotation, radians.
     longest_only : bool
         Whether the longest line of a shape is its only base, as printed; else a line that no base is near enough to
-        becomes the next one, because a shape often joins buildings and trees that stand at other angles.
+        becomes the next one, because a shape often joins buildings and trees that stand at other angles. A further base
+        to which no line is turned is dropped.
     """
     rotation = np.full(len(lines), np.nan)
-    bases: dict[int, list[float]] = {}
+    bases: dict[int, list[int]] = {}
+    followers = np.zeros(len(lines), dtype=np.int64)
     angles = np.arctan2(lines[:, UY], lines[:, UX])
     for i in by_length(lines):
-        directions = bases.setdefault(int(shapes[i]), [])
-        turns = [turn for base in directions if abs(turn := rotation_between(angles[i], base)) <= tolerance]
-        if turns:
-            rotation[i] = turns[0]
-        elif not directions or not longest_only:
-            directions.append(float(angles[i]))
+        own = bases.setdefault(int(shapes[i]), [])
+        turns = {base: rotation_between(angles[i], angles[base]) for base in own}
+        near = [base for base, turn in turns.items() if abs(turn) <= tolerance]
+        if near:
+            rotation[i] = turns[near[0]]
+            followers[near[0]] += 1
+        elif not own or not longest_only:
+            own.append(int(i))
             rotation[i] = 0.0
+    for own in bases.values():
+        for base in own[1:]:
+            if followers[base] == 0:
+                rotation[base] = np.nan
     return rotation
 
 

@@ -96,22 +96,28 @@ def _show(axes: Axes, trace: Trace, raster: NDArray[Any], **style: Any) -> None:
     axes.imshow(raster[::step, ::step], extent=(0, columns, rows, 0), interpolation="nearest", **style)
 
 
-def _photograph(trace: Trace, fade: float = 0.0) -> NDArray[np.float32]:
+def _photograph(trace: Trace) -> NDArray[np.float32]:
     bands = [trace.image.values[trace.image.bands.index(name)] for name in ("red", "green", "blue")]
     full = np.float32(np.iinfo(trace.image.values.dtype).max)
     step = max(1, max(trace.grid.shape) // _DRAWN)
-    colours = np.stack([band[::step, ::step] for band in bands], axis=-1).astype(np.float32) / full
-    return np.asarray(colours + (1 - colours) * np.float32(fade), dtype=np.float32)
+    return np.asarray(np.stack([band[::step, ::step] for band in bands], axis=-1).astype(np.float32) / full)
 
 
-def _show_photograph(axes: Axes, trace: Trace, fade: float = 0.0) -> None:
+def _show_photograph(axes: Axes, trace: Trace, *, faint: bool = False) -> None:
+    """Show the orthoimage, in colour or, under coloured lines, in light grey."""
     rows, columns = trace.grid.shape
-    axes.imshow(_photograph(trace, fade), extent=(0, columns, rows, 0), interpolation="nearest")
+    colours = _photograph(trace)
+    style: dict[str, Any] = {}
+    if faint:
+        colours = 0.55 + 0.45 * colours.mean(axis=-1)
+        style = {"cmap": "gray", "vmin": 0, "vmax": 1}
+    axes.imshow(colours, extent=(0, columns, rows, 0), interpolation="nearest", **style)
 
 
 def _masks(figure: Figure, trace: Trace) -> None:
     rows, columns = trace.grid.shape
-    figure.set_size_inches(12.0, min(16.0, max(5.0, 12.0 * rows / columns + 0.8)))
+    figure.set_size_inches(12.0, min(16.0, max(5.0, 12.0 * rows / columns + 0.6)))
+    figure.set_layout_engine("constrained")
     panels = figure.subplots(2, 2)
     _show_photograph(panels[0, 0], trace)
     panels[0, 0].set_title("orthoimage")
@@ -136,7 +142,7 @@ def _key(axes: Axes, entries: list[tuple[str, str, int]]) -> None:
 
 def _lines(figure: Figure, trace: Trace) -> None:
     axes = _axes(figure, trace)
-    _show_photograph(axes, trace, fade=0.4)
+    _show_photograph(axes, trace, faint=True)
     entries = []
     for fate, colour in _FATE_COLOURS.items():
         chosen = trace.fates == fate
@@ -185,7 +191,7 @@ def _initial(figure: Figure, trace: Trace) -> None:
 def _votes(figure: Figure, trace: Trace) -> None:
     assert trace.votes is not None
     axes = _axes(figure, trace)
-    _show_photograph(axes, trace, fade=0.5)
+    _show_photograph(axes, trace, faint=True)
     voted = ~np.isnan(trace.votes[:, 0])
     mean = trace.votes[voted].mean(axis=1)
     lines = LineCollection(list(_segments(trace.lines[voted])), cmap="RdYlBu", linewidths=1.8)

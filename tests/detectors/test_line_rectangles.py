@@ -53,6 +53,10 @@ def test_lines_beyond_the_reach_of_the_longest_are_turned_to_the_next_longest():
     lines = np.array([line(0, 0, 10, 90), line(0, 9, 45, 80), line(5, 0, 130, 40), line(5, 5, 97, 30)])
     rotation = np.degrees(adjust_to_shape(lines, np.zeros(4, np.int64), tolerance=np.pi / 8, longest_only=False))
     np.testing.assert_allclose(rotation, [0, 0, 5, 3], atol=1e-9)
+    rotation = np.degrees(
+        adjust_to_shape(lines[[0, 1, 3]], np.zeros(3, np.int64), tolerance=np.pi / 8, longest_only=False)
+    )
+    np.testing.assert_allclose(rotation, [0, np.nan, 3], atol=1e-9)
 
 
 def test_rotating_turns_a_line_about_its_centre():
