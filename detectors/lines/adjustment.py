@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .boxes import OX, OY, UX, UY, Boxes, lengths
 
-__all__ = ["adjust_to_neighbours", "adjust_to_shape", "rotate"]
+__all__ = ["adjust_to_neighbours", "adjust_to_shape", "by_length", "rotate", "rotation_between"]
 
 
 @njit(cache=True)

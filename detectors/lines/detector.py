@@ -20,7 +20,7 @@ from ...scenes.raster import Image
 from ...scenes.scene import Scene
 from ..base import Detector, Step
 from .adjustment import by_length
-from .boxes import OX, OY, Boxes, box_corners, lengths, prefix_sums
+from .boxes import OX, OY, UX, UY, Boxes, box_corners, lengths, prefix_sums, widths
 from .colours import Colours
 from .contours import trace_shapes
 from .corners import find_corners
@@ -324,7 +324,7 @@ class LineDetector(Detector):
             rise=self.rise,
             whole_initial=self.compare == "whole",
         )
-        longest_first = np.argsort(-np.maximum(lengths(initial), initial[:, 7] - initial[:, 6]), kind="stable")
+        longest_first = np.argsort(-np.maximum(lengths(initial), widths(initial)), kind="stable")
         final, final_fates = final_rectangles(
             rasters.colours, rasters.masks.primary, rasters.masks.secondary, rules, initial, longest_first
         )
@@ -343,8 +343,8 @@ class LineDetector(Detector):
 def _beyond(lines: Boxes, coverage: NDArray[np.uint8], reach: float) -> NDArray[np.bool_]:
     """Tell which lines have nothing measured on their outer side: the border of the points or of the image."""
     rows, columns = coverage.shape
-    x = np.floor(lines[:, OX] + reach * lines[:, 3]).astype(np.intp)
-    y = np.floor(lines[:, OY] - reach * lines[:, 2]).astype(np.intp)
+    x = np.floor(lines[:, OX] + reach * lines[:, UY]).astype(np.intp)
+    y = np.floor(lines[:, OY] - reach * lines[:, UX]).astype(np.intp)
     on = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
     covered = coverage[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)] > 0
     return np.asarray(~(on & covered), dtype=np.bool_)

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from ..base import Step
-from .boxes import Boxes, box_centres, box_corners, lengths
+from .boxes import Boxes, box_centres, box_corners, lengths, widths
 from .texture import BIN_COUNT, Texture
 from .trace import Fate, Trace
 
@@ -222,6 +222,7 @@ def _histograms(figure: Figure, trace: Trace, texture: Texture) -> None:
     by_area = np.argsort(-(box_areas := _areas(trace)), kind="stable")
     chosen = [*by_area[trace.kept[by_area]][:6], *by_area[~trace.kept[by_area]][:6]]
     figure.set_size_inches(12, 7.5)
+    figure.set_layout_engine("constrained")
     if not chosen:
         figure.text(0.5, 0.5, "no candidate", ha="center")
         return
@@ -239,9 +240,7 @@ def _histograms(figure: Figure, trace: Trace, texture: Texture) -> None:
         axes.set_ylabel("length of edges, m", fontsize=8)
     for axes in panels.flat[len(chosen) :]:
         axes.set_axis_off()
-    figure.tight_layout()
 
 
 def _areas(trace: Trace) -> NDArray[np.float64]:
-    boxes = trace.candidates
-    return np.asarray((boxes[:, 5] - boxes[:, 4]) * (boxes[:, 7] - boxes[:, 6]) * trace.grid.gsd**2)
+    return np.asarray(lengths(trace.candidates) * widths(trace.candidates) * trace.grid.gsd**2)
