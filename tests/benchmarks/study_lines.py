@@ -1,6 +1,6 @@
-"""The studies behind docs/line-detectors.md: pattern of results, ablation, sensitivity, pictures.
+"""The studies behind docs/line-detectors.md: pattern of results, what is lost where, ablation, sensitivity, pictures.
 
-Run by hand: ``python tests/benchmarks/study_lines.py pattern|ablation|sensitivity|entropy|pictures [--seeds 1,2,3]``.
+Run by hand: ``python tests/benchmarks/study_lines.py STUDY [--seeds 1,2,3]`` with one of the studies named by ``--help``.
 
 Tables go to standard output as Markdown, pictures to docs/images. Scenes are made once and kept in the folder named by
 ROOFBENCH_BENCH_SCENES (default: bench-scenes). Figures are means over scenes and seeds of the percentages of each.
@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import os
 import statistics
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -178,6 +179,63 @@ def entropy(seeds):
         print(f"| {value:g} | " + " | ".join(text) + " |", flush=True)
 
 
+def loss_of(reference, trace, lines, detected):
+    """Return the step that lost one reference, from what lies in it."""
+    import shapely
+
+    from roofbench.detectors.lines.trace import Fate
+
+    if reference.intersection(detected).area > 0.4 * reference.area:
+        return "covered by another part"
+    xmin, ymin, xmax, ymax = reference.bounds
+    x, y = np.meshgrid(np.arange(xmin, xmax, 0.2), np.arange(ymin, ymax, 0.2))
+    inside = shapely.contains_xy(reference, x, y)
+    cells, on = trace.grid.cells(x[inside], y[inside])
+    if not (trace.masks.primary.ravel()[cells] & on).mean() >= 0.5:
+        return "mask: less than half black"
+    fates = trace.fates[shapely.distance(lines, reference.exterior) < 1.2]
+    if not len(fates):
+        return "no line of 3 m"
+    if (fates == Fate.RECTANGLE).any():
+        from roofbench.detectors.lines.boxes import box_corners
+
+        corners = box_corners(trace.candidates[~trace.kept])
+        lost = shapely.polygons(np.stack(trace.grid.to_world(corners[..., 1], corners[..., 0]), axis=-1))
+        covers = shapely.area(shapely.intersection(lost, reference)) > 0.4 * reference.area
+        return "texture" if covers.any() else "rectangle elsewhere"
+    return "lines: " + Fate(int(np.bincount(fates).argmax())).label
+
+
+def losses(seeds):
+    """Count the missed references by the step that lost them."""
+    import shapely
+
+    from roofbench.detectors.lines.boxes import box_centres
+
+    counts, heads = [], []
+    for detector in ("original", "improved"):
+        for area, names in AREAS.items():
+            counted, size = Counter(), 0
+            for scene in (scene_of(name, seed) for name in names for seed in seeds):
+                trace = rb.make_detector(detector).trace(scene.for_detection())
+                found = rb.make_detector(detector).detect(scene.for_detection(), np.random.default_rng(0))
+                verdicts = rb.make_evaluator("threshold-free").evaluate(found, scene.reference).verdicts.references
+                middle = box_centres(trace.fitted)
+                lines = shapely.points(*trace.grid.to_world(middle[:, 1], middle[:, 0]))
+                detected = shapely.union_all(found.polygons)
+                size += len(scene.reference)
+                for polygon, verdict in zip(scene.reference.polygons, verdicts["verdict"], strict=True):
+                    if verdict == "FN":
+                        counted[loss_of(polygon, trace, lines, detected)] += 1
+            counts.append(counted)
+            heads.append(f"{detector}, {area} ({size})")
+    print("| lost by | " + " | ".join(heads) + " |")
+    print("|---" * (len(heads) + 1) + "|")
+    for reason in sorted({reason for counted in counts for reason in counted}):
+        print(f"| {reason} | " + " | ".join(str(counted[reason]) for counted in counts) + " |")
+    print("| all missed | " + " | ".join(str(counted.total()) for counted in counts) + " |")
+
+
 def save(figure, name):
     """Save a picture of less than 300 kB: with 256 colours, then smaller."""
     from PIL import Image as Picture
@@ -222,7 +280,7 @@ def pictures(_seeds):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("study", choices=("pattern", "ablation", "sensitivity", "entropy", "pictures"))
+    parser.add_argument("study", choices=("pattern", "losses", "ablation", "sensitivity", "entropy", "pictures"))
     parser.add_argument("--seeds", default="1,2,3")
     parser.add_argument("--detectors", default="original,improved")
     options = parser.parse_args()
@@ -230,7 +288,8 @@ def main():
     if options.study == "ablation":
         ablation(seeds, options.detectors.split(","))
     else:
-        {"pattern": pattern, "sensitivity": sensitivity, "entropy": entropy, "pictures": pictures}[options.study](seeds)
+        studies = {"pattern": pattern, "losses": losses, "sensitivity": sensitivity, "entropy": entropy}
+        (studies | {"pictures": pictures})[options.study](seeds)
 
 
 if __name__ == "__main__":
