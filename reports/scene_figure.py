@@ -36,7 +36,7 @@ def overlay_figure(view: SceneView, *, window: tuple[float, float, float, float]
     """
     xmin, ymin, xmax, ymax = window or view.extent
     count = len(view.overlays)
-    columns = min(3, count)
+    columns = 2 if count == 4 else min(3, count)
     rows = math.ceil(count / columns)
     width = {1: 8.0, 2: 6.0}.get(columns, 4.6)
     shape = float(np.clip((ymax - ymin) / (xmax - xmin), 0.4, 2.0))

@@ -123,7 +123,7 @@ def _label_axis(
     n = f"{min(counts)}" if min(counts) == max(counts) else f"{min(counts)}–{max(counts)}"
     title = name.removeprefix("scene.").replace("_", " ")
     panel.set_xlabel(f"{shortened(title)}{f' [{unit}]' if unit else ''}; n = {n} scenes")
-    kind = "of the scenes" if name.startswith("scene.") else "of the detector"
+    kind = "scene" if name.startswith("scene.") else "detector parameter"
     panel.set_title(kind, loc="left", fontsize=10)
     if len(values) <= 7:
         panel.set_xticks([places[value] for value in values], [shortened(_shown(value), 14) for value in values])

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 app = typer.Typer(name="plot", help="Single figures as PNG, SVG or PDF.", no_args_is_help=True)
 
 OutputOption = Annotated[Path, typer.Option("--output", "-o", help="Picture: .png, .svg or .pdf.")]
+DpiOption = Annotated[int, typer.Option(min=30, max=1200, help="Pixels per inch of a PNG.")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
 
 
@@ -33,6 +34,7 @@ def sweep(
     level: Annotated[float, typer.Option(min=0, max=1, help="Where a detector counts as broken down.")] = 0.8,
     store: StoreOption = DEFAULT_STORE,
     plugin: PluginOption = None,
+    dpi: DpiOption = 120,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Plot quality along swept parameters and generator axes, with intervals and break-down points."""
@@ -58,7 +60,7 @@ def sweep(
         lines = [line for line in lines if line.axis in axis]
     if not lines:
         raise ParameterError(f"{table or store} holds no sweep: 'roofbench sweep DETECTOR --vary ...' makes one")
-    _save(sensitivity_figure(lines, level=level), output, overwrite)
+    _save(sensitivity_figure(lines, level=level), output, dpi, overwrite)
     for line in lines:
         if line.break_down:
             typer.echo(line.break_down, err=True)
@@ -76,6 +78,7 @@ def scene(
     ] = None,
     store: StoreOption = DEFAULT_STORE,
     plugin: PluginOption = None,
+    dpi: DpiOption = 120,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Plot the verdicts of detectors on a scene, side by side."""
@@ -97,23 +100,24 @@ def scene(
         view = scene_view(opened, opened.scene(rows[0].scene_id), chosen, judges[0].key, {}) if judges else None
     if view is None:
         raise ParameterError(f"{store}: {name!r} has no verdicts to draw: it has no reference, or was not evaluated")
-    _save(overlay_figure(view, window=_window(window, view.extent)), output, overwrite)
+    _save(overlay_figure(view, window=_window(window, view.extent)), output, dpi, overwrite)
 
 
 @app.command("gate")
 def gate(
     result: Annotated[Path, typer.Argument(help="What 'roofbench gate ... --format json' printed.")],
     output: OutputOption,
+    dpi: DpiOption = 120,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Plot the paired differences of a gate with their intervals against the margins."""
     from ...reports.gate_figure import gate_figure
     from ...reports.gate_json import read_gate
 
-    _save(gate_figure(read_gate(result)), output, overwrite)
+    _save(gate_figure(read_gate(result)), output, dpi, overwrite)
 
 
-def _save(figure: Figure, path: Path, overwrite: bool) -> None:
+def _save(figure: Figure, path: Path, dpi: int, overwrite: bool) -> None:
     from matplotlib.text import Text
 
     from ...reports.figures import save_figure
@@ -123,7 +127,7 @@ def _save(figure: Figure, path: Path, overwrite: bool) -> None:
         text.set_parse_math(False)
     figure.set_facecolor("white")
     figure.patch.set_alpha(1)
-    figure.set_dpi(120)
+    figure.set_dpi(dpi)
     save_figure(figure, path, overwrite=overwrite)
 
 
