@@ -18,8 +18,8 @@ from ..evaluators.base import Index
 from ..evaluators.registry import make_evaluator
 from ..reports.report_data import Sensitivity, SensitivityPoint
 from ..scenes.errors import InputError, RoofbenchError
-from ..scenes.parameters import Parameterised
-from ..scenes.synthetic.presets import preset
+from ..scenes.synthetic.presets import preset, preset_names
+from ..scenes.synthetic.recipe import SceneParameters
 from .inference import bootstrap_interval
 from .plan import Judge
 from .records import RunRow
@@ -186,8 +186,11 @@ def _facts_of(axis: str, owner: str) -> tuple[str, Any]:
     """Return unit and default of an axis; empty and None where they are not known here."""
     name = axis.removeprefix("scene.")
     try:
-        given: Parameterised = preset(owner) if axis.startswith("scene.") else make_detector(owner)
-        return given.parameters()[name].unit, given.values()[name]
+        if axis != name:
+            known = SceneParameters.parameters()
+            return known[name].unit, preset(owner).values()[name] if owner in preset_names() else None
+        detector = make_detector(owner)
+        return detector.parameters()[name].unit, detector.values()[name]
     except (RoofbenchError, KeyError):
         return "", None
 

@@ -15,8 +15,10 @@ __all__ = ["save_figure"]
 _ENDINGS = (".png", ".svg", ".pdf")
 
 
-def save_figure(figure: Figure, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a figure; the ending of the file name chooses the format.
+def save_figure(
+    figure: Figure, path: str | os.PathLike[str], *, dpi: float | None = None, overwrite: bool = False
+) -> None:
+    """Write a figure; the ending of the file name chooses the format, `dpi` the pixels per inch of a PNG.
 
     Raises
     ------
@@ -29,4 +31,4 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, overwrite: bool
     with whole_file(target, overwrite=overwrite) as scratch:
         # No creation date: the same input gives the same bytes.
         metadata = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[target.suffix.lower()]
-        figure.savefig(scratch, metadata=metadata)
+        figure.savefig(scratch, metadata=metadata, dpi="figure" if dpi is None else dpi)

@@ -127,8 +127,7 @@ def _save(figure: Figure, path: Path, dpi: int, overwrite: bool) -> None:
         text.set_parse_math(False)
     figure.set_facecolor("white")
     figure.patch.set_alpha(1)
-    figure.set_dpi(dpi)
-    save_figure(figure, path, overwrite=overwrite)
+    save_figure(figure, path, dpi=dpi, overwrite=overwrite)
 
 
 def _window(text: str | None, extent: tuple[float, float, float, float]) -> tuple[float, float, float, float] | None:
