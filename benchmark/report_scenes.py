@@ -68,7 +68,7 @@ def draw_scenes(
     for scene_id in order:
         mine = by_scene[scene_id]
         chosen = [mine[label] for label in labels if label in mine][:_MOST_OVERLAYS]
-        view = scene_view(store, store.scene(scene_id), chosen, key, values)
+        view = scene_view(store, store.scene(scene_id), chosen, key)
         if view is None:
             continue
         count = sum(len(overlay.ids) + len(view.ids) for overlay in view.overlays)
@@ -101,13 +101,7 @@ def draw_scenes(
     )
 
 
-def scene_view(
-    store: Store,
-    scene: StoredScene,
-    rows: Iterable[RunRow],
-    key: str,
-    values: Mapping[int, Mapping[str, float | None]],
-) -> SceneView | None:
+def scene_view(store: Store, scene: StoredScene, rows: Iterable[RunRow], key: str) -> SceneView | None:
     """Return a scene with the overlays of some runs; None without reference or verdicts that can be drawn."""
     if scene.reference is None or scene.extent is None:
         return None
@@ -128,7 +122,6 @@ def scene_view(
                 ids=tuple(detected.ids.tolist()),
                 detections=_side(sides["detection"]),
                 references=_side(sides["reference"]),
-                values=values.get(row.id, {}),
             )
         )
     if not overlays:

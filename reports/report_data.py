@@ -84,8 +84,6 @@ class Overlay:
     ids : tuple of int
         Of the detections.
     detections, references : Side
-    values : mapping of str to float or None
-        Index values by key.
     """
 
     label: str
@@ -95,7 +93,6 @@ class Overlay:
     ids: tuple[int, ...]
     detections: Side
     references: Side
-    values: Mapping[str, float | None]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -48,7 +48,6 @@ def overlay(label, detected, reference, run):
         ids=tuple(detected.ids.tolist()),
         detections=side(evaluation.verdicts.detections),
         references=side(evaluation.verdicts.references),
-        values=evaluation.values,
     )
 
 

@@ -97,7 +97,7 @@ def scene(
         judges = stored_judges(opened, rows)
         first = {row.label: row for row in sorted(rows, key=lambda row: -row.seed)}
         chosen = [row for row in rows if first[row.label] is row]
-        view = scene_view(opened, opened.scene(rows[0].scene_id), chosen, judges[0].key, {}) if judges else None
+        view = scene_view(opened, opened.scene(rows[0].scene_id), chosen, judges[0].key) if judges else None
     if view is None:
         raise ParameterError(f"{store}: {name!r} has no verdicts to draw: it has no reference, or was not evaluated")
     _save(overlay_figure(view, window=_window(window, view.extent)), output, dpi, overwrite)

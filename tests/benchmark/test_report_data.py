@@ -91,6 +91,13 @@ def test_report_writes_one_file_and_replaces_nothing_unasked(folder):
     roofbench("report", "runs.sqlite", "-o", "report.html", "--overwrite", folder=folder)
 
 
+def test_run_writes_the_report_beside_its_leaderboard(folder):
+    roofbench("run", "hamlet", "-d", "ndsm", "--store", "run.sqlite", "-o", "out", folder=folder)
+    written = {path.name for path in (folder / "out").iterdir()}
+    assert written == {"leaderboard.csv", "leaderboard.md", "report.html"}
+    assert "<h1" in (folder / "out" / "report.html").read_text("utf-8")
+
+
 def test_a_store_compared_with_itself_is_the_same(folder):
     answer = roofbench("report", "compare", "runs.sqlite", "runs.sqlite", "-o", "same.md", folder=folder)
     lines = [line for line in answer.stdout.splitlines() if line.startswith("ndsm")]
