@@ -10,9 +10,15 @@ from matplotlib.figure import Figure
 from ..scenes.errors import OutputError
 from ..scenes.output import whole_file
 
-__all__ = ["save_figure"]
+__all__ = ["check_picture", "save_figure"]
 
 _ENDINGS = (".png", ".svg", ".pdf")
+
+
+def check_picture(path: Path) -> None:
+    """Raise `OutputError` when the ending of a file names no format for figures."""
+    if path.suffix.lower() not in _ENDINGS:
+        raise OutputError(f"{path}: unknown file ending {path.suffix!r}: name it {', '.join(_ENDINGS)}")
 
 
 def save_figure(
@@ -26,8 +32,7 @@ def save_figure(
         Unknown ending, existing file, or folder that cannot be written.
     """
     target = Path(path)
-    if target.suffix.lower() not in _ENDINGS:
-        raise OutputError(f"{target}: unknown file ending {target.suffix!r}: name it {', '.join(_ENDINGS)}")
+    check_picture(target)
     with whole_file(target, overwrite=overwrite) as scratch:
         # No creation date: the same input gives the same bytes.
         metadata = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[target.suffix.lower()]

@@ -96,9 +96,11 @@ def draw_verdicts(
     """
     tables = (verdicts.references, verdicts.detections)
     every = np.concatenate([table["geometry"].to_numpy() for table in tables])
+    if area is not None:
+        every = np.append(every, area)
+    if extent is None and len(every):
+        extent = tuple(shapely.total_bounds(every))
     if extent is None:
-        extent = tuple(shapely.total_bounds(np.append(every, area) if area is not None else every))
-    if not np.isfinite(extent).all():
         axes.text(0.5, 0.5, "no footprints on either side", ha="center", va="center", transform=axes.transAxes)
         axes.set_axis_off()
         return []

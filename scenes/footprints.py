@@ -193,8 +193,8 @@ class Footprints:
         >>> [round(area, 1) for area in row.joined(0.1).areas]
         [90.0, 45.0]
         """
-        if not gap > 0:
-            raise InputError(f"{self.source}: footprints are joined over a gap of more than 0 m, not {gap:g}")
+        if not 0 < gap < np.inf:
+            raise InputError(f"{self.source}: footprints are joined over gaps of a width of more than 0 m, not {gap:g}")
         grown = shapely.union_all(shapely.buffer(self.polygons, gap / 2, join_style="mitre"))
         blocks = shapely.get_parts(shapely.buffer(grown, -gap / 2, join_style="mitre"))
         return Footprints.of(blocks, crs=self.crs, source=f"{self.source} (joined over gaps below {gap:g} m)")

@@ -19,7 +19,6 @@ __all__ = ["check_target", "whole_file", "whole_folder"]
 
 
 def check_target(path: Path, overwrite: bool) -> None:
-    """Raise `OutputError` when a file or folder could not be written here; for a check before long work."""
     """Raise `OutputError` when a file or folder cannot be written; call it before long work."""
     if path.exists() and not overwrite:
         raise OutputError(f"{path} exists already: add --overwrite (in Python: overwrite=True) or name another file")

@@ -25,7 +25,15 @@ from .names import nearest_hint
 from .output import whole_file
 from .vector_columns import storable_columns
 
-__all__ = ["DRIVERS", "read_footprints", "read_polygon", "split_layer", "write_footprints", "write_layers"]
+__all__ = [
+    "DRIVERS",
+    "output_driver",
+    "read_footprints",
+    "read_polygon",
+    "split_layer",
+    "write_footprints",
+    "write_layers",
+]
 
 #: Geometry type of shapely to that of OGR.
 _KINDS = {1: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon", 0: "Point", 4: "MultiPoint"}
@@ -161,6 +169,18 @@ def write_footprints(
     write_layers({name: (footprints.polygons, columns)}, file, crs=footprints.crs, overwrite=overwrite)
 
 
+def output_driver(path: str | os.PathLike[str]) -> str:
+    """Return the GDAL driver that the ending of a file to be written names, or raise `OutputError`."""
+    file = Path(path)
+    driver = DRIVERS.get(file.suffix.lower())
+    if driver is None:
+        raise OutputError(
+            f"{file}: unknown file ending {file.suffix!r}{nearest_hint(file.suffix, DRIVERS)}; "
+            f"roofbench writes {', '.join(DRIVERS)}"
+        )
+    return driver
+
+
 def write_layers(
     layers: Mapping[str, tuple[NDArray[np.object_], Mapping[str, NDArray[Any]]]],
     path: str | os.PathLike[str],
@@ -173,12 +193,7 @@ def write_layers(
     Lines and polygons may be mixed between layers, not within one.
     """
     file = Path(path)
-    driver = DRIVERS.get(file.suffix.lower())
-    if driver is None:
-        raise OutputError(
-            f"{file}: unknown file ending {file.suffix!r}{nearest_hint(file.suffix, DRIVERS)}; "
-            f"roofbench writes {', '.join(DRIVERS)}"
-        )
+    driver = output_driver(file)
     if len(layers) > 1 and driver != "GPKG":
         raise OutputError(f"{file}: {len(layers)} layers ({', '.join(layers)}) need a GeoPackage: name it .gpkg")
     if crs is not None:

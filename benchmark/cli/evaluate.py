@@ -56,20 +56,25 @@ def evaluate(
     from ...reports.evaluation_text import format_evaluation
     from ...scenes.errors import InputError, UnsupportedError
     from ...scenes.folder import open_scene
-    from ...scenes.output import check_target
     from ...scenes.vector_files import read_footprints, read_polygon
 
     chosen: dict[str, Any] = {"matching": matching, "area": area, "gsd": gsd, "minimum_area": minimum_area}
     given = {name: str(value) for name, value in chosen.items() if value is not None}
     judge = make_evaluator(evaluator, given)
-    for target in (verdicts, plot):
-        if target is not None:
-            check_target(target, overwrite)
+    _check_targets(verdicts, plot, inputs=(detected, reference, evaluation_area), overwrite=overwrite)
+    if building_id is not None and join_gaps is not None:
+        raise InputError(
+            "blocks of joined footprints have no building ids: give --building-id or --join-gaps, not both"
+        )
     found = read_footprints(detected, crs=crs)
     scene = open_scene(reference) if Path(reference).is_dir() else None
     if scene is not None:
         if scene.reference is None:
             raise InputError(f"{reference}: the scene has no reference footprints: name a vector file")
+        if building_id is not None:
+            raise InputError(
+                f"{reference} is a scene with building ids of its own: leave out --building-id, or name a vector file"
+            )
         truth, boundary, grid = scene.reference, scene.area, scene.evaluation_grid
     else:
         truth, boundary, grid = read_footprints(reference, crs=crs, building_id=building_id), None, None
@@ -79,6 +84,8 @@ def evaluate(
         for footprints in (found, truth):
             for repair in footprints.repairs[:10]:
                 typer.echo(f"{footprints.source}: {repair}", err=True)
+            if len(footprints.repairs) > 10:
+                typer.echo(f"{footprints.source}: {len(footprints.repairs) - 10} more mended or left out", err=True)
             if not len(footprints):
                 typer.echo(f"{footprints.source}: no footprints", err=True)
     if join_gaps is not None:
@@ -99,6 +106,28 @@ def evaluate(
 
             save_figure(verdict_figure(result, title=title, area=boundary), plot, overwrite=overwrite)
     typer.echo(format_evaluation(result, form, title=title))
+
+
+def _check_targets(
+    verdicts: Path | None, plot: Path | None, *, inputs: tuple[str | None, ...], overwrite: bool
+) -> None:
+    """Raise `OutputError` for any output that could not be written, before there is a first one."""
+    from ...scenes.errors import OutputError
+    from ...scenes.output import check_target
+    from ...scenes.vector_files import output_driver, split_layer
+
+    read = {split_layer(name)[0].resolve() for name in inputs if name}
+    for target in (verdicts, plot):
+        if target is not None:
+            check_target(target, overwrite)
+            if target.resolve() in read:
+                raise OutputError(f"{target} is an input of this comparison: name another file")
+    if verdicts is not None:
+        output_driver(verdicts)
+    if plot is not None:
+        from ...reports.figures import check_picture
+
+        check_picture(plot)
 
 
 def _short(path: str) -> str:

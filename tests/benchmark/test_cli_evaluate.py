@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pyogrio
 import pytest
 import shapely
@@ -94,6 +95,22 @@ def test_verdicts_and_plot_are_written(files):
     assert (files / "v.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_comparison_of_nothing_with_nothing_can_be_drawn(files):
+    rb.write_footprints(rb.Footprints.empty(crs="EPSG:25832"), files / "none.gpkg")
+    roofbench("evaluate", "none.gpkg", "none.gpkg", "--plot", "none.png", "-q", folder=files)
+    assert (files / "none.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_no_repair_goes_unmentioned(files):
+    flat = shapely.Polygon([(0, 0), (5, 0), (9, 0)])
+    from roofbench.scenes.vector_files import write_layers
+
+    write_layers({"d": (np.array([*MOVED, *[flat] * 14], dtype=object), {})}, files / "flat.gpkg", crs="EPSG:25832")
+    run = roofbench("evaluate", "flat.gpkg", "r.gpkg", "-f", "csv", folder=files)
+    assert run.stderr.count("left out") == 11
+    assert "flat.gpkg: 4 more mended or left out" in run.stderr
+
+
 def test_verdicts_in_a_format_of_one_layer_tell_the_side(files):
     roofbench("evaluate", "d.geojson", "r.gpkg", "--verdicts", "v.geojson", "-q", folder=files)
     sides = pyogrio.read_dataframe(files / "v.geojson")["side"].value_counts().to_dict()
@@ -169,6 +186,17 @@ BAD_INPUT = {
     "unknown parameter": (["d.geojson", "r.gpkg", "-e", "threshold-free[maching=overlap]"], "did you mean 'matching'"),
     "no gap to join": (["d.geojson", "r.gpkg", "--join-gaps", "0"], "more than 0 m"),
     "a folder that is no scene": (["d.geojson", "."], "scene.toml"),
+    "endless gap to join": (["d.geojson", "r.gpkg", "--join-gaps", "inf"], "more than 0 m, not inf"),
+    "building ids of blocks": (
+        ["d.geojson", "r.gpkg", "--building-id", "register", "--join-gaps", "0.1"],
+        "--building-id or --join-gaps, not both",
+    ),
+    "building ids of a scene": (["d.geojson", "small", "--building-id", "register"], "leave out --building-id"),
+    "second output of unknown ending": (
+        ["d.geojson", "r.gpkg", "--verdicts", "v.gpkg", "--plot", "v.bmp"],
+        "unknown file ending",
+    ),
+    "input as output": (["d.geojson", "r.gpkg", "--verdicts", "r.gpkg", "--overwrite"], "is an input"),
     "area without polygons": (["d.geojson", "r.gpkg", "--evaluation-area", "points.gpkg"], "no polygons"),
 }
 
@@ -185,6 +213,8 @@ def test_bad_input_gets_one_sentence_and_exit_code_two(files, case):
 
     points = shapely.points([[0, 0], [1, 1]])
     write_layers({"points": (points, {})}, files / "points.gpkg", crs="EPSG:25832")
+    truth = rb.Footprints.of(HOUSES, crs="EPSG:25832")
+    rb.save_scene(rb.Scene("small", (-10, -10, 90, 30), crs="EPSG:25832", reference=truth), files / "small")
     before = sorted(files.iterdir())
     arguments, expected = BAD_INPUT[case]
     run = roofbench("evaluate", *arguments, folder=files, expect=2)
