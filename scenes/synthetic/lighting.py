@@ -20,9 +20,8 @@ __all__ = ["AMBIENT", "HAZE", "colour_surface", "sun_vector", "sunlit"]
 
 #: Share of the light on flat ground that comes from the sky, per band: the sky is blue, so shadows are.
 AMBIENT: NDArray[np.float32] = np.array((0.36, 0.39, 0.44, 0.28), dtype=np.float32)
-#: Light that the air between camera and ground adds, per band, in grey values, and the gain of the exposure.
+#: Light that the air between camera and ground adds, per band, in grey values.
 HAZE: NDArray[np.float32] = np.array((11.0, 12.5, 14.0, 5.0), dtype=np.float32)
-_GAIN = 1.04
 
 _TILES, _CORRUGATED, _GRAVEL, _PLANTED, _LEAVES = (
     int(look) for look in (Texture.TILES, Texture.CORRUGATED, Texture.GRAVEL, Texture.PLANTED, Texture.LEAVES)
@@ -113,6 +112,7 @@ def colour_surface(
         LAWNS,
         AMBIENT,
         HAZE,
+        world.recipe.exposure,
         (float(world.layout.pattern[8]), float(world.layout.pattern[9])),
     )
     return colours
@@ -142,6 +142,7 @@ def _paint(
     lawns: NDArray[np.float32],
     ambient: NDArray[np.float32],
     haze: NDArray[np.float32],
+    exposure: float,
     turn: tuple[float, float],
 ) -> None:
     west, north, gsd = frame
@@ -177,7 +178,7 @@ def _paint(
                 )
             for b in range(bands):
                 light = ambient[b] + ((1.0 - ambient[b]) * direct if lit[r, c] else 0.0)
-                colours[b, r, c] = int(min(max(albedo[b] * light * 255.0 * _GAIN + haze[b], 2.0), 253.0))
+                colours[b, r, c] = int(min(max(albedo[b] * light * 255.0 * exposure + haze[b], 2.0), 253.0))
 
 
 @njit(cache=True)

@@ -132,7 +132,8 @@ _KNOX: dict[str, Any] = {
     "registration_shift": 0.6,
     "vertical_noise": 0.1,
     "horizontal_noise": 0.3,
-    "sun_elevation": 42,
+    "sun_elevation": 46,
+    "exposure": 1.2,
 }
 _TORONTO: dict[str, Any] = {
     "epsg": 32617, "elevation": 76, "slope": 0.4, "aspect": 75, "undulation": 3, "orientation": -17,

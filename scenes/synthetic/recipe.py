@@ -125,6 +125,7 @@ class SceneParameters(Parameterised):
     )
     sun_azimuth: float = parameter(40.0, unit="deg", minimum=0, maximum=360, doc="clockwise from north")
     blur: float = parameter(0.7, unit="px", minimum=0, maximum=5, doc="standard deviation of the point spread")
+    exposure: float = parameter(1.0, minimum=0.3, maximum=3, doc="factor on the brightness of the orthoimage")
     image_noise: float = parameter(0.012, minimum=0, maximum=0.3, doc="standard deviation, share of the full scale")
     registration_shift: float = parameter(
         0.0, unit="m", minimum=0, maximum=10, doc="offset of the orthoimage against the points", swept=(0, 0.5, 1, 2)

@@ -231,6 +231,39 @@ def table(samples):
     return "\n".join(lines)
 
 
+def picture(samples, path):
+    """Draw the distributions of real (filled) and synthetic (lines) scenes."""
+    from matplotlib.figure import Figure
+
+    panels = (
+        ("height above ground of crowns, m", lambda s: s.height[s.crown], (2, 16)),
+        ("height above ground of roofs, m", lambda s: s.height[s.roof], (2, 14)),
+        ("roughness of crowns, m", lambda s: roughness(s, s.crown), (0, 2.5)),
+        ("roughness of roofs, m", lambda s: roughness(s, s.roof), (0, 0.4)),
+        ("(G-R)/(G+R) of crowns", lambda s: green_red(s, s.crown), (-0.3, 0.4)),
+        ("(G-R)/(G+R) of roofs", lambda s: green_red(s, s.roof), (-0.3, 0.4)),
+        ("mask edge from outline, m", outline_distance, (-1.5, 1.5)),
+        ("first returns per m2 over their mean", lambda s: density(s) / density(s).mean(), (0, 2.5)),
+    )
+    figure = Figure(figsize=(13, 5.6), layout="constrained")
+    axes = figure.subplots(2, 4).ravel()
+    styles = (
+        {"histtype": "stepfilled", "color": "#9ecae1", "alpha": 0.75},
+        {"histtype": "stepfilled", "color": "#fdae6b", "alpha": 0.65},
+        {"histtype": "step", "color": "#54278f", "linewidth": 1.6},
+        {"histtype": "step", "color": "#006d2c", "linewidth": 1.6},
+    )
+    for axis, (title, measure, span) in zip(axes, panels, strict=True):
+        for part, style in zip(samples, styles, strict=True):
+            values = measure(part)
+            if len(values):
+                axis.hist(np.clip(values, *span), bins=36, range=span, density=True, label=part.name, **style)
+        axis.set_title(title, fontsize=10)
+        axis.set_yticks([])
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    figure.savefig(path, dpi=90)
+
+
 def main():
     delft, ign = SHARED / "delft-ahn3", SHARED / "ign-870200-colour"
     samples = [
@@ -240,6 +273,8 @@ def main():
         synthetic("synthetic suburb", "moonee-ponds-small", buildings=20),
     ]
     print(table(samples))
+    if len(sys.argv) > 1:
+        picture(samples, sys.argv[1])
 
 
 if __name__ == "__main__":

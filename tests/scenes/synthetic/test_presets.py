@@ -93,3 +93,17 @@ def test_knox_is_hilly_and_wooded_where_fairfield_is_neither():
     assert np.ptp(knox.dem.values) > 20 > 10 > np.ptp(fairfield.dem.values)
     assert tall(knox) > 0.15
     assert tall(fairfield) < 0.06
+
+
+@pytest.mark.parametrize(("name", "least", "most"), [("moonee-ponds", 0.0, 0.02), ("knox", 0.25, 1.0)])
+def test_a_height_threshold_by_tiles_fails_on_the_slopes_of_knox_alone(name, least, most):
+    """One ground height per 450 px tile, as in the paper of 2010: how much bare ground rises above it by 2.5 m."""
+    scene = rb.make_scene(name, seed=1)
+    cloud, tile = scene.points, 450 * AWRANGJEB[name][4]
+    column, row = ((cloud.x - scene.extent[0]) // tile).astype(int), ((cloud.y - scene.extent[1]) // tile).astype(int)
+    number = row * 1000 + column
+    ground = scene.dem.sample(cloud.x, cloud.y)
+    level = np.bincount(number, ground) / np.maximum(np.bincount(number), 1)
+    bare = cloud.classification == 2
+    above = float(np.mean(cloud.z[bare] > level[number[bare]] + 2.5))
+    assert least <= above <= most
