@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .clutter import Cover
 from .palettes import GROUND, LAWNS
 from .recipe import SceneParameters
-from .solids import Texture
+from .solids import Body, Texture
 from .streams import uniform
 from .surface import Surface
 from .world import World
@@ -23,9 +23,8 @@ AMBIENT: NDArray[np.float32] = np.array((0.36, 0.39, 0.44, 0.28), dtype=np.float
 #: Light that the air between camera and ground adds, per band, in grey values.
 HAZE: NDArray[np.float32] = np.array((11.0, 12.5, 14.0, 5.0), dtype=np.float32)
 
-_TILES, _CORRUGATED, _GRAVEL, _PLANTED, _LEAVES = (
-    int(look) for look in (Texture.TILES, Texture.CORRUGATED, Texture.GRAVEL, Texture.PLANTED, Texture.LEAVES)
-)
+_TILES, _CORRUGATED, _GRAVEL, _PLANTED = map(int, (Texture.TILES, Texture.CORRUGATED, Texture.GRAVEL, Texture.PLANTED))
+_HEDGE = int(Body.HEDGE)
 
 
 _PLAZA, _VINES = int(Cover.PLAZA), int(Cover.VINES)
@@ -243,7 +242,7 @@ def _solid_albedo(
         factor += 0.10 * grain + 0.10 * patchy
         bed = (along * 0.17) % 1.0 < 0.04 or (across * 0.17) % 1.0 < 0.04
         factor *= 0.92 if bed else 1.0
-    if body == 3:
+    if body == _HEDGE:
         factor += 0.16 * grain
         direct = 0.85 + 0.2 * grain
     # Each face weathers in its own way.

@@ -54,7 +54,6 @@ class Texture(enum.IntEnum):
     CORRUGATED = 2
     GRAVEL = 3
     PLANTED = 4
-    LEAVES = 5
 
 
 @dataclass

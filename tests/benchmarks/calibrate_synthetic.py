@@ -216,8 +216,8 @@ def table(samples):
             if s.colours is not None
             else "-"
         ),
-        "brightness of roofs": lambda s: quantiles(brightness(s, s.roof) * 10),
-        "brightness of crowns": lambda s: quantiles(brightness(s, s.crown) * 10),
+        "brightness of roofs, tenths": lambda s: quantiles(brightness(s, s.roof) * 10),
+        "brightness of crowns, tenths": lambda s: quantiles(brightness(s, s.crown) * 10),
         "first returns per m2": lambda s: quantiles(density(s)),
         "their variation": lambda s: f"{density(s).std() / density(s).mean():.2f}",
         "mask edge from outline, m": lambda s: " ".join(
