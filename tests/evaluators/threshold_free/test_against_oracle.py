@@ -44,6 +44,33 @@ def test_counts_are_equal_and_areas_agree_to_nine_digits(block, general, matchin
         assert_same(evaluation, naive.evaluate(detected, reference, building, matching=matching))
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_large_outlines_cut_into_pieces_share_the_same_areas(seed, monkeypatch):
+    monkeypatch.setattr("roofbench.evaluators.threshold_free.overlap._MANY_VERTICES", 6)
+    monkeypatch.setattr("roofbench.evaluators.threshold_free.overlap._FEW_PAIRS", 1)
+    detected, reference, building = scene(seed, general=True)
+    evaluation = ThresholdFree().evaluate(footprints(detected), footprints(reference, building))
+    assert_same(evaluation, naive.evaluate(detected, reference, building))
+
+
+def test_one_outline_around_a_quarter_is_overlaid_in_pieces(monkeypatch):
+    houses = [shapely.box(20 * i, 20 * j, 20 * i + 10, 20 * j + 10) for i in range(14) for j in range(14)]
+    quarter = shapely.union_all([*shapely.buffer(houses, 1, join_style="mitre"), shapely.box(4, 4, 266, 5)])
+    quarter = shapely.union_all([quarter, *(shapely.box(20 * i + 4, 4, 20 * i + 5, 266) for i in range(14))])
+    assert shapely.get_num_coordinates(quarter) > 1000
+    sizes = []
+    intersection = shapely.intersection
+
+    def watched(one, two):
+        sizes.extend(np.atleast_1d(np.maximum(shapely.get_num_coordinates(one), shapely.get_num_coordinates(two))))
+        return intersection(one, two)
+
+    monkeypatch.setattr(shapely, "intersection", watched)
+    evaluation = ThresholdFree().evaluate(footprints([quarter]), footprints(houses))
+    assert evaluation.graph.overlaps.area == pytest.approx(100.0)
+    assert sum(size > 1000 for size in sizes) <= 2
+
+
 @pytest.mark.parametrize("seed", range(60))
 def test_evaluation_area_and_minimum_size_are_as_defined(seed):
     detected, reference, building = scene(seed, general=seed % 2 == 0)
