@@ -44,7 +44,7 @@ _OUTSET = 0.5
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
 _CURVE_STEP = 0.3
 #: Root mean square distance from its line at which a segment must have missed a corner, point spacings.
-_MISSED_CORNER = 0.8
+_MISSED_CORNER = 0.5
 #: Threshold that no mean reaches: entropy is not used.
 _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
 
@@ -121,7 +121,7 @@ class LineDetector(Detector):
     )  # fmt: skip
     missed_corner: float | None = parameter(
         None, unit="m", minimum=0.01,
-        doc="root mean square distance of a curve from its line above which it is split; none: 0.8 point spacings",
+        doc="root mean square distance of a curve from its line above which it is split; none: 0.5 point spacings",
         source="not in the print; 1000 is none",
     )  # fmt: skip
     inside_reach: float = parameter(
