@@ -124,3 +124,15 @@ def test_a_line_fitted_to_noisy_points_is_their_total_least_squares_line():
     axis = np.linalg.svd(centred)[2][0]
     assert abs(line[UX] * axis[1] - line[UY] * axis[0]) < 1e-9
     assert (line[OX] - points[:, 0].mean()) * axis[1] == pytest.approx((line[OY] - points[:, 1].mean()) * axis[0])
+
+
+def test_a_piece_that_missed_a_corner_is_split_where_it_is_farthest_from_its_line():
+    bend = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 30.0]])
+    curves = pack(bend, closed=False, spacing=1.0)
+    none, offsets = np.empty(0, np.int64), np.zeros(2, np.int64)
+    whole = fit_segments(curves, curves.points, none, offsets, shortest=5.0)
+    split = fit_segments(curves, curves.points, none, offsets, shortest=5.0, deviation=1.0)
+    assert len(whole) == 1
+    assert len(split) == 2
+    np.testing.assert_allclose(lengths(split.lines), [60, 30])
+    np.testing.assert_allclose(np.abs(split.lines[:, [UX, UY]]), [[1, 0], [0, 1]], atol=1e-9)
