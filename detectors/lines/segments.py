@@ -86,14 +86,17 @@ def fit_line(
 def _deviation(
     points: NDArray[np.float64], first: int, count: int, start: int, n: int, line: NDArray[np.float64]
 ) -> tuple[float, int]:
-    """Return the root mean square distance of a piece of curve from a line, and its farthest point (0..count - 1)."""
+    """Return the root mean square distance of a piece of curve from its line, and its point farthest from its chord."""
     total, farthest, most = 0.0, 0, -1.0
+    a, b = start + first % n, start + (first + count - 1) % n
+    dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     for k in range(count):
         at = start + (first + k) % n
         off = (points[at, 1] - line[OY]) * line[UX] - (points[at, 0] - line[OX]) * line[UY]
         total += off * off
-        if abs(off) > most:
-            farthest, most = k, abs(off)
+        aside = abs((points[at, 1] - points[a, 1]) * dx - (points[at, 0] - points[a, 0]) * dy)
+        if aside > most:
+            farthest, most = k, aside
     return math.sqrt(total / count), farthest
 
 
@@ -109,7 +112,7 @@ def _fit_pieces(
     deviation: float,
     lines: list[NDArray[np.float64]],
 ) -> None:
-    """Append the lines of a piece of curve, split at its farthest point for as long as it deviates too much."""
+    """Append the lines of a piece of curve, split where it is farthest from its chord while it deviates too much."""
     waiting = [(first, count)]
     while len(waiting) > 0:
         piece, length = waiting.pop()
@@ -184,7 +187,7 @@ def fit_segments(
         Shorter lines are left out, pixels.
     deviation : float
         A piece whose root mean square distance from its line is larger has a corner that was missed, and is split where
-        it is farthest from the line, pixels.
+        it is farthest from its chord, pixels.
     """
     lines, owner = _fit_all(
         points, curves.points, curves.offsets, curves.closed, corners, corner_offsets, shortest, deviation

@@ -126,7 +126,7 @@ def test_a_line_fitted_to_noisy_points_is_their_total_least_squares_line():
     assert (line[OX] - points[:, 0].mean()) * axis[1] == pytest.approx((line[OY] - points[:, 1].mean()) * axis[0])
 
 
-def test_a_piece_that_missed_a_corner_is_split_where_it_is_farthest_from_its_line():
+def test_a_piece_that_missed_a_corner_is_split_where_it_is_farthest_from_its_chord():
     bend = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 30.0]])
     curves = pack(bend, closed=False, spacing=1.0)
     none, offsets = np.empty(0, np.int64), np.zeros(2, np.int64)
