@@ -417,6 +417,8 @@ def _tally_notes(tallies: Mapping[str, float]) -> Iterator[str]:
     scenes, by_pixels = number("scenes.all"), number("scenes.by_pixels")
     if scenes == 1:
         yield "areas counted in pixels" if by_pixels else "areas exact, by polygon overlay"
+    elif scenes and by_pixels in (0, scenes):
+        yield f"areas {'counted in pixels' if by_pixels else 'exact'} in all {scenes} scenes"
     elif scenes:
         yield f"areas counted in pixels in {by_pixels} of {scenes} scenes, exact in the others"
     if number("left_out.detected"):

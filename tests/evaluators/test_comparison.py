@@ -30,6 +30,14 @@ def test_a_crs_that_is_not_in_metres_is_refused(crs, message):
         rb.evaluate(houses, houses)
 
 
+def test_a_pooled_evaluation_says_how_areas_were_measured():
+    exact = rb.evaluate(HOUSES, HOUSES)
+    counted = rb.evaluate(HOUSES, HOUSES, grid=rb.Grid(0, 10, 0.5, 20, 20))
+    assert rb.pool([exact, exact]).notes == ("pooled over 2 evaluations", "areas exact in all 2 scenes")
+    assert rb.pool([counted, counted]).notes[1] == "areas counted in pixels in all 2 scenes"
+    assert rb.pool([exact, counted]).notes[1] == "areas counted in pixels in 1 of 2 scenes, exact in the others"
+
+
 def test_a_list_of_polygons_is_no_footprint_set():
     with pytest.raises(InputError, match=r"reference is list, not Footprints: .* Footprints\.of"):
         rb.evaluate(HOUSES, [HOUSE])
