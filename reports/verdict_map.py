@@ -112,11 +112,14 @@ def draw_verdicts(
     axes.set_yticks([])
     handles: list[Patch] = []
     window = shapely.box(*extent)
-    for table, shown in zip(tables, (("left out", "FN"), ("left out", "TP", "MD", "FP")), strict=True):
-        for verdict in shown:
+    shown = (("reference", ("left out", "FN")), ("detection", ("left out", "TP", "MD", "FP")))
+    for table, (side, groups) in zip(tables, shown, strict=True):
+        for verdict in groups:
             chosen = table["geometry"].to_numpy()[(table["verdict"] == verdict).to_numpy()]
             if len(chosen):
                 handles.append(_draw_group(axes, chosen, verdict, window))
+                if verdict == "left out":
+                    handles[-1].set_label(f"{side} {handles[-1].get_label()}")
     references = verdicts.references
     matched = references["geometry"].to_numpy()[(references["verdict"] == "TP").to_numpy()]
     if len(matched):

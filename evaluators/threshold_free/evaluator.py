@@ -407,7 +407,11 @@ def _repair_notes(*sets: Footprints) -> Iterator[str]:
             ids = [str(repair.id) for repair in footprints.repairs if repair.action == action]
             if ids:
                 more = f" and {len(ids) - 10} more" if len(ids) > 10 else ""
-                yield f"{footprints.source}: {len(ids)} features {action}: {', '.join(ids[:10])}{more}"
+                yield f"{footprints.source}: {_counted(len(ids), 'feature')} {action}: {', '.join(ids[:10])}{more}"
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _tally_notes(tallies: Mapping[str, float]) -> Iterator[str]:
@@ -422,11 +426,11 @@ def _tally_notes(tallies: Mapping[str, float]) -> Iterator[str]:
     elif scenes:
         yield f"areas counted in pixels in {by_pixels} of {scenes} scenes, exact in the others"
     if number("left_out.detected"):
-        yield f"{number('left_out.detected')} detections left out"
+        yield f"{_counted(number('left_out.detected'), 'detection')} left out"
     if number("left_out.reference_outside"):
-        yield f"{number('left_out.reference_outside')} references outside the evaluation area left out"
+        yield f"{_counted(number('left_out.reference_outside'), 'reference')} outside the evaluation area left out"
     if number("left_out.reference_small"):
-        yield f"{number('left_out.reference_small')} references below the minimum area left out"
+        yield f"{_counted(number('left_out.reference_small'), 'reference')} below the minimum area left out"
     by_polis = number("geometric.pairs") - number("geometric.pairs_by_corners")
     if by_polis:
         yield f"RMSE uses PoLiS for {by_polis} of {number('geometric.pairs')} pairs, whose outlines are no rectangles"

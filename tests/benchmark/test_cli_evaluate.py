@@ -150,6 +150,11 @@ def test_a_scene_folder_brings_reference_area_and_grid(files):
     result = json.loads(roofbench("evaluate", "d.geojson", "small/", "-f", "json", folder=files).stdout)
     assert result["counts"]["reference"] == 2
     assert result["left_out"]["reference_outside"] == 2
+    assert result["notes"][1:] == ["1 detection left out", "2 references outside the evaluation area left out"]
+    roofbench("evaluate", "d.geojson", "small/", "--plot", "v.svg", "-q", folder=files)
+    drawing = (files / "v.svg").read_text(encoding="utf-8")
+    assert "detection left out (1)" in drawing
+    assert "reference left out (2)" in drawing
 
 
 def test_houses_of_a_row_are_joined_to_blocks_on_request(files):
