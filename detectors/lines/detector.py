@@ -43,7 +43,7 @@ PAPER_PIXEL = 0.15
 _OUTSET = 0.5
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
 _CURVE_STEP = 0.3
-#: Root mean square distance from its line at which a segment must have missed a corner, point spacings.
+#: Root mean square distance from its line at which a segment must have missed a corner, point spacings or pixels.
 _MISSED_CORNER = 0.5
 #: Threshold that no mean reaches: entropy is not used.
 _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
@@ -121,7 +121,7 @@ class LineDetector(Detector):
     )  # fmt: skip
     missed_corner: float | None = parameter(
         None, unit="m", minimum=0.01,
-        doc="root mean square distance of a curve from its line above which it is split; none: 0.5 point spacings",
+        doc="RMS distance of a curve from its line above which it is split; none: half a point spacing or pixel",
         source="not in the print; 1000 is none",
     )  # fmt: skip
     inside_reach: float = parameter(
@@ -282,7 +282,7 @@ class LineDetector(Detector):
             product=self.corner_product,
             straight=(self.corner_angle, 360.0 - self.corner_angle),
         )
-        missed = _MISSED_CORNER * rasters.spacing if self.missed_corner is None else self.missed_corner
+        missed = self.missed_corner or _MISSED_CORNER * max(rasters.spacing, gsd)
         segments = fit_segments(
             curves, points, corners, offsets, shortest=self.minimum_side / gsd - 2 * _OUTSET, deviation=missed / gsd
         )
