@@ -112,7 +112,7 @@ def _overlay_areas(
     at each of its houses, so it is cut into pieces first.
     """
     areas = np.empty(len(first))
-    vertices = shapely.get_num_coordinates(one)[first], shapely.get_num_coordinates(two)[second]
+    vertices = shapely.get_num_coordinates(one[first]), shapely.get_num_coordinates(two[second])
     lopsided = np.minimum(*vertices) <= _MANY_VERTICES
     direct = np.ones(len(first), dtype=bool)
     for large, others, large_row, other_row, count in (
