@@ -91,8 +91,11 @@ class Baseline:
     def with_labels_of(self, other: Baseline) -> Baseline:
         """Return this one with detectors named as in `other`, where they differ in nothing but parameters.
 
-        So ``-d "ndsm[height=2]"`` is compared with the baseline's ``ndsm``.
+        So ``-d "ndsm[height=2]"`` is compared with the baseline's ``ndsm``; one detector alone is compared with the
+        one of the other, whatever they are called.
         """
+        if len(self.detectors) == len(other.detectors) == 1:
+            return replace(self, detectors=dict(zip(other.detectors, self.detectors.values(), strict=True)))
         named = {}
         for label, measured in self.detectors.items():
             name = label.partition("[")[0]

@@ -137,7 +137,7 @@ def compare_detector(
     """Return the verdict of every index of one detector."""
     pairs = [_pairs(before, after, index) for index in indices]
     differences = [
-        [(1 if index.better == "higher" else -1) * (new - old) for old, new in found.values()]
+        [new - old if index.better == "higher" else old - new for old, new in found.values()]
         for index, found in zip(indices, pairs, strict=True)
     ]
     worse = holm([paired_p([d + margins[i.key] for d in ds]) for i, ds in zip(indices, differences, strict=True)])
@@ -163,8 +163,8 @@ def compare_detector(
                 verdict, p = "better", better[place]
             elif -margin <= low and high <= margin:
                 verdict = "equal"
-            else:
-                p = min(worse[place], better[place])
+            elif abs(effect) > margin:
+                p = worse[place] if effect < 0 else better[place]
         verdicts.append(
             IndexVerdict(
                 detector=label,

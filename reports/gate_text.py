@@ -35,7 +35,7 @@ class IndexVerdict:
     low, high : float, optional
         Its 95 % bootstrap interval.
     p : float, optional
-        Holm-adjusted, of the test that decided; None where nothing was tested.
+        Holm-adjusted, of the test against the margin that the mean difference exceeds; None where it exceeds none.
     margin : float
         Differences up to this are taken as none.
     scenes : int

@@ -219,3 +219,43 @@ def test_a_dirty_tree_cannot_become_a_baseline(cli, monkeypatch):
 
 def test_every_default_index_exists():
     assert [index.key for index in INDICES] == list(gate_module.DEFAULT_INDICES)
+
+
+def test_run_time_is_compared_side_by_side(monkeypatch, tmp_path, misbehaving):
+    from contextlib import nullcontext
+
+    from roofbench.benchmark import timing
+
+    monkeypatch.setattr(timing, "_unpacked", lambda commit: nullcontext(tmp_path))  # old code: the same code
+    scenes = {f"hamlet-{n}": BaselineScene(SceneRecipe.of_preset("hamlet", seed=n), "") for n in range(2)}
+    recipe = PluginRecipe(misbehaving, {"seconds": 0.001})
+    one = replace(baseline(measured([0.5]), 1), scenes=scenes, detectors={"d": Measured(recipe, (0,), {})})
+    (verdict,) = timing.time_side_by_side(one, repeats=1)
+    assert (verdict.verdict, verdict.scenes) == ("not measurable", 2)
+    assert "run time needs 6 scenes" in verdict.note
+    assert 0.05 < verdict.candidate < 20
+
+
+@pytest.mark.parametrize(
+    ("ratios", "verdict"),
+    [
+        ([1.3, 1.4, 1.25, 1.5, 1.35, 1.45], "worse"),
+        ([0.7] * 6, "better"),
+        ([1.0, 1.01] * 3, "equal"),
+        ([1.3], "not measurable"),
+    ],
+)
+def test_run_time_has_verdicts_of_its_own(ratios, verdict):
+    from roofbench.benchmark import timing
+
+    found = timing._verdict("d", [np.log(ratio) for ratio in ratios], 0.1, 0.05)
+    assert found.verdict == verdict
+    assert found.candidate == pytest.approx(np.exp(np.mean(np.log(ratios))))
+
+
+def test_a_baseline_without_a_commit_cannot_be_timed():
+    from roofbench.benchmark.timing import time_side_by_side
+
+    unknown = replace(baseline(measured([0.5]), 1), version=CodeVersion("1", None, False))
+    with pytest.raises(RoofbenchError, match="names no commit"):
+        time_side_by_side(unknown)
