@@ -153,8 +153,8 @@ def compare_detector(
         if lowest_p(len(ds)) > level / len(indices):
             verdict = "not measurable"
             note = (
-                f"{len(indices)} indices at level {level:g} need {scenes_needed(len(indices), level)} scenes; "
-                f"{label} has {len(ds)} where {index.title} is defined on both sides"
+                f"{label}: {len(indices)} indices at level {level:g} need {scenes_needed(len(indices), level)} scenes "
+                f"where both sides are defined, not {len(ds)}"
             )
         elif effect is not None and low is not None and high is not None:
             if effect < -margin and worse[place] <= level:

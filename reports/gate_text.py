@@ -80,10 +80,11 @@ class GateResult:
 
     @property
     def exit_code(self) -> int:
-        """1 for a regression, 4 when nothing could be measured, else 0."""
+        """1 for a regression, 4 when no index of quality could be measured, else 0."""
         if self.failures or any(verdict.verdict == "worse" for verdict in self.verdicts):
             return 1
-        return 4 if all(verdict.verdict == "not measurable" for verdict in self.verdicts) else 0
+        quality = [verdict for verdict in self.verdicts if not verdict.index.key.startswith("cost.")]
+        return 4 if all(verdict.verdict == "not measurable" for verdict in quality) else 0
 
     def summary(self) -> str:
         """Return the outcome in one sentence."""
@@ -109,8 +110,9 @@ def format_gate(result: GateResult, form: Literal["table", "md", "json"]) -> str
         lines = [f"### Gate: {result.summary()}", "", f"Baseline {result.baseline}, candidate {result.candidate}.", ""]
         lines += [f"| {' | '.join(header)} |", "|" + "|".join([":--", ":--", ":--", *["--:"] * 7]) + "|"]
         lines += [f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in rows]
-        lines += ["", how, *(f"\n- {note}" for note in notes), *(f"\n- failed: {text}" for text in result.failures)]
-        return "\n".join(lines)
+        lines += ["", how]
+        lines += ["", *(f"- {note}" for note in notes), *(f"- failed: {text}" for text in result.failures)]
+        return "\n".join(lines).rstrip()
     lines = [f"Baseline {result.baseline}, candidate {result.candidate}", *_aligned([header, *rows]), how]
     lines += [*notes, *(f"failed: {text}" for text in result.failures), f"Gate {result.summary()}"]
     return "\n".join(lines)

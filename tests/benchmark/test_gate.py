@@ -99,7 +99,7 @@ def test_noise_that_allows_both_is_undecided(values):
 def test_five_scenes_are_not_measurable_and_exit_4(values):
     result = gate(measured(values[:5]), measured(values[:5], shift=0.5), 5)
     assert (verdicts(result), result.exit_code) == ({"not measurable"}, 4)
-    assert "need 8 scenes; d has 5" in result.verdicts[0].note
+    assert "d: 5 indices at level 0.05 need 8 scenes where both sides are defined, not 5" in result.verdicts[0].note
 
 
 def test_a_run_that_fails_now_is_a_regression(values):
