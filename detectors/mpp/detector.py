@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,14 +25,16 @@ from ...scenes.parameters import parameter
 from ...scenes.points import PointCloud
 from ...scenes.raster import Elevation, Grid
 from ...scenes.scene import Scene
-from ..base import Detector
+from ..base import Detector, Step
 from .annealing import Annealed, Schedule, anneal
 from .background import Background, estimate_background, score_cells, textures
 from .candidates import propose_boxes
-from .cells import Cells, cell_size, make_cells
+from .cells import HIGH, Cells, cell_size, make_cells
 from .energy import Model, own_energy
+from .figures import draw_convergence, draw_evidence, draw_heights, draw_rectangles
 from .moves import MOVES
 from .polish import polish
+from .printed import run_printed
 from .random_stream import stream
 from .rectangles import to_world
 from .roofs import KINDS, fit_roof
@@ -137,11 +141,42 @@ class MPP(Detector):
     jump_share: float = parameter(0.3, minimum=0, maximum=0.9, doc="share of births and deaths among the moves")
     split_share: float = parameter(0.1, minimum=0, maximum=0.5, doc="share of splits and merges among the moves")
     tile: float = parameter(256.0, unit="m", minimum=16, doc="side of a tile, at least twice the longest side")
+    false_alarm_ratio: float = parameter(
+        0.5, minimum=1e-6, maximum=1, doc="p_f of the printed algorithm (equation 7); the paper gives no value"
+    )
+    iterations: int = parameter(30000, minimum=1, doc="T_m of the printed algorithm; the paper gives no value")
     workers: int = parameter(1, minimum=1, doc="threads; they change the time, never the result")
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Return rectangles with the attributes height, tau, slope (m, m, m/m), roof and energy, and the run record."""
         return self._run(scene, rng)[0]
+
+    def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
+        """Yield heights, evidence, boxes, convergence and result of the same run."""
+        found, prepared, rectangles = self._run(scene, rng)
+        if prepared is None:
+            return
+        cells, boxes = prepared.cells, prepared.boxes
+        yield Step("01-heights", "Heights above ground of high cells.", partial(draw_heights, cells))
+        yield Step(
+            "02-evidence",
+            "What each cell adds to a rectangle: blue speaks for a roof, red against it.",
+            partial(draw_evidence, cells, prepared.score),
+        )
+        yield Step(
+            "03-boxes",
+            f"{len(boxes)} boxes that the data suggest as births.",
+            partial(draw_rectangles, cells, boxes, colour="darkorange"),
+        )
+        trace = found.metadata["trace"]
+        yield Step(
+            "04-convergence",
+            "Energy, temperature, number of buildings and acceptance of each move over the chain.",
+            partial(draw_convergence, trace),
+        )
+        yield Step(
+            "05-buildings", f"{len(rectangles)} buildings after polishing.", partial(draw_rectangles, cells, rectangles)
+        )
 
     def _run(self, scene: Scene, rng: np.random.Generator) -> tuple[Footprints, Prepared | None, _Rectangles]:
         seed = int(rng.integers(2**63))
@@ -155,8 +190,13 @@ class MPP(Detector):
         with ThreadPoolExecutor(self.workers) as pool:
             prepared = self._prepare(points, seen, pool)
             ready = time.perf_counter()
-            rectangles, results = self._sample(prepared, seed, pool)
-        record = {
+            results: list[Annealed] = []
+            if self.mode == "paper":
+                rectangles, trace = self._printed(prepared, points, seed)
+            else:
+                rectangles, results = self._sample(prepared, seed, pool)
+                trace = _joined_trace(results)
+        record: dict[str, Any] = {
             "mode": self.mode,
             "seed": seed,
             "cell": prepared.cells.grid.gsd,
@@ -167,7 +207,7 @@ class MPP(Detector):
                 "chain": sum(result.chain for result in results),
                 "final": sum(result.final for result in results),
             },
-            "trace": _joined_trace(results),
+            "trace": trace,
             "seconds": {"preparation": ready - began, "sampling": time.perf_counter() - ready},
         }
         return self._footprints(prepared, rectangles, scene.crs, record), prepared, rectangles
@@ -277,6 +317,41 @@ class MPP(Detector):
         close_walls(tables.small, tables.large, model, rectangles, 0.25 * self.price)
         return rectangles, [results[key] for key in sorted(results)]
 
+    def _printed(self, prepared: Prepared, points: PointCloud, seed: int) -> tuple[_Rectangles, dict[str, Any]]:
+        """Run the printed algorithm on elevations; the Gaussians of ground and trees come from low and rough cells."""
+        cells = prepared.cells
+        grid, cell = cells.grid, cells.grid.gsd
+        index, inside = grid.cells(points.x, points.y)
+        inside &= np.isfinite(points.z)
+        index, z = index[inside], points.z[inside]
+        base = float(np.median(z)) if len(z) else 0.0
+        z = z - base
+        sums = [np.bincount(index, weights=z**k, minlength=grid.rows * grid.columns) for k in range(3)]
+        table = np.stack(sums, axis=-1).reshape(*grid.shape, 3)
+        high = (cells.state == HIGH).ravel()[index]
+        rough = (prepared.score < 0).ravel()[index] & high
+        roof = high & ~rough
+        classes = np.array([_normal(z[~high]), _normal(z[rough] if rough.any() else z)])
+        height = _normal(z[roof] if roof.any() else z)
+        prior = np.array([(15 / cell, 6 / cell), (10 / cell, 4 / cell), height, (0.5, 0.25)])
+        steps = np.array([1.0 / cell, 1.0 / cell, 0.1, 0.5, 0.1])
+        sides = np.array([self.least_side / cell, self.largest_side / cell])
+        found, trace = run_printed(
+            table,
+            classes,
+            prior,
+            steps,
+            sides,
+            stream([seed]),
+            self.iterations,
+            self.false_alarm_ratio,
+            5000,
+            max(self.iterations // 100, 1),
+        )
+        rectangles = np.ascontiguousarray(found[:, :5])
+        columns = ("proposals", "temperature", "energy", "buildings")
+        return rectangles, {name: trace[:, k].tolist() for k, name in enumerate(columns)}
+
     def _footprints(
         self, prepared: Prepared, rectangles: _Rectangles, crs: str | None, record: dict[str, Any]
     ) -> Footprints:
@@ -312,6 +387,11 @@ def _blocks(corners: NDArray[np.float64], gap: float, crs: str | None, record: d
     wide = shapely.buffer(rectangles.polygons, gap / 2, join_style="mitre")
     union = shapely.buffer(shapely.union_all(wide), -gap / 2, join_style="mitre")
     return Footprints.of(shapely.get_parts(union), crs=crs, metadata=record, source=MPP.name)
+
+
+def _normal(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Return mean and standard deviation, the latter at least 10 cm."""
+    return float(values.mean()), max(float(values.std()), 0.1)
 
 
 def _joined_trace(results: list[Annealed]) -> dict[str, Any]:

@@ -137,3 +137,24 @@ def test_without_births_from_data_the_sampler_still_finds_the_houses():
     found = detect(cloud(7), "mpp[data_births=0,start=empty,hot=30,effort=30]")
     truth = shapely.union_all([shapely.box(*roof[:4]) for roof in ROOFS])
     assert shapely.intersection(shapely.union_all(found.polygons), truth).area > 0.85 * truth.area
+
+
+def test_the_printed_algorithm_runs_repeats_and_finds_the_large_flat_roof():
+    found = detect(cloud(), "mpp[mode=paper]")
+    assert wkb(found) == wkb(detect(cloud(), "mpp[mode=paper]"))
+    hall = shapely.box(*ROOFS[2][:4])
+    assert shapely.area(shapely.intersection(shapely.union_all(found.polygons), hall)) > 0.5 * hall.area
+    record = found.metadata
+    assert json.loads(json.dumps(record)) == record
+    assert record["mode"] == "paper"
+    assert len(record["trace"]["energy"]) == len(record["trace"]["buildings"])
+
+
+def test_every_step_can_be_drawn():
+    figures = pytest.importorskip("matplotlib.figure")
+    steps = list(make_detector("mpp").steps(scene(cloud()), np.random.default_rng(0)))
+    assert [step.name for step in steps] == ["01-heights", "02-evidence", "03-boxes", "04-convergence", "05-buildings"]
+    for step in steps:
+        figure = figures.Figure()
+        step.draw(figure)
+        assert figure.axes
