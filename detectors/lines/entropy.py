@@ -62,16 +62,17 @@ def local_entropy(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
         total = np.float32(0.0)
         for column in range(-reach, columns):
             entering, leaving = column + reach, column - reach - 1
-            if entering < columns:
-                for r in range(top, bottom):
-                    level = grey[r, entering]
-                    total += gain[histogram[level]]
-                    histogram[level] += 1
+            # Out before in: with both columns held, a count could pass the end of the table.
             if leaving >= 0:
                 for r in range(top, bottom):
                     level = grey[r, leaving]
                     histogram[level] -= 1
                     total -= gain[histogram[level]]
+            if entering < columns:
+                for r in range(top, bottom):
+                    level = grey[r, entering]
+                    total += gain[histogram[level]]
+                    histogram[level] += 1
             if column >= 0:
                 held = (bottom - top) * (min(column + reach, columns - 1) - max(column - reach, 0) + 1)
                 entropy = np.log2(held) - total / held
