@@ -8,14 +8,14 @@ seed makes a change readable in a diff.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
 from ..evaluators.base import Evaluator
-from ..scenes.errors import InputError
+from ..scenes.errors import InputError, ParameterError
 from ..scenes.output import whole_file
 from .plan import Judge
 from .provenance import CodeVersion
@@ -78,30 +78,56 @@ class Baseline:
     scenes: Mapping[str, BaselineScene]
     detectors: Mapping[str, Measured]
 
-    def to_suite(self, *, detectors: Sequence[str] | None = None) -> Suite:
-        """Return the suite that repeats it, with the detectors of these labels only where given."""
-        entrants = tuple(
-            Entrant(measured.recipe.detector(), measured.seeds)
-            for label, measured in self.detectors.items()
-            if detectors is None or label in detectors
-        )
+    def to_suite(self) -> Suite:
+        """Return the suite that repeats it."""
+        entrants = tuple(Entrant(found.recipe.detector(), found.seeds) for found in self.detectors.values())
         scenes = tuple(scene.recipe for scene in self.scenes.values())
         return Suite(self.suite, scenes, entrants, (self.evaluator.evaluator(),))
 
-    def with_labels_of(self, other: Baseline) -> Baseline:
-        """Return this one with detectors named as in `other`, where they differ in nothing but parameters.
+    def counterparts(self, labels: Sequence[str]) -> dict[str, str]:
+        """Return for each of these detectors the label of the one here that it is compared with.
 
-        So ``-d "ndsm[height=2]"`` is compared with the baseline's ``ndsm``; one detector alone is compared with the
-        one of the other, whatever they are called.
+        That of the same label, else the only one of that name: ``ndsm[height=2]`` is compared with ``ndsm``. One
+        detector alone is compared with the one that is alone here, whatever they are called. A detector that has no
+        counterpart is left out.
+
+        Raises
+        ------
+        ParameterError
+            Two of them would be compared with the same.
         """
-        if len(self.detectors) == len(other.detectors) == 1:
-            return replace(self, detectors=dict(zip(other.detectors, self.detectors.values(), strict=True)))
-        named = {}
-        for label, measured in self.detectors.items():
+        if len(labels) == len(self.detectors) == 1:
+            return dict(zip(labels, self.detectors, strict=True))
+        found: dict[str, str] = {}
+        for label in labels:
             name = label.partition("[")[0]
-            same = [known for known in other.detectors if known.partition("[")[0] == name]
-            named[same[0] if label not in other.detectors and len(same) == 1 else label] = measured
-        return replace(self, detectors=named)
+            same = [known for known in self.detectors if known.partition("[")[0] == name]
+            if label in self.detectors or len(same) == 1:
+                found[label] = label if label in self.detectors else same[0]
+        if len(set(found.values())) < len(found):
+            raise ParameterError(f"{', '.join(found)}: each detector of a baseline can be compared with one only")
+        return found
+
+    def with_labels_of(self, other: Baseline) -> Baseline:
+        """Return this one with detectors named as their counterparts in `other`."""
+        named = other.counterparts(list(self.detectors))
+        return replace(self, detectors={named.get(label, label): found for label, found in self.detectors.items()})
+
+    def only(self, labels: Iterable[str]) -> Baseline:
+        """Return this one with these detectors only."""
+        return replace(self, detectors={label: self.detectors[label] for label in labels})
+
+    def with_scenes(self, pattern: str) -> Baseline:
+        """Return this one with only the scenes whose name matches a pattern such as ``knox*``."""
+        kept = {scene.name for scene in self.to_suite().with_scenes(pattern).scenes}
+        return replace(
+            self,
+            scenes={name: scene for name, scene in self.scenes.items() if name in kept},
+            detectors={
+                label: replace(found, runs={run: values for run, values in found.runs.items() if run[0] in kept})
+                for label, found in self.detectors.items()
+            },
+        )
 
     def to_json(self) -> str:
         """Return the file's text: one line per scene, and per detector, scene and seed."""

@@ -1,21 +1,25 @@
 """The gate: whether a change of the code has made a detector worse.
 
-Candidate and baseline are paired by scene and seed; a stochastic detector counts by its mean over seeds of each scene.
-Per index, with differences signed so that positive is better and a margin that is taken as no difference:
+Candidate and baseline are paired by scene; a stochastic detector counts by its mean over seeds of each scene. Per
+index, with differences signed so that positive is better and a margin that is taken as no difference:
 
 worse
-    the mean difference lies below -margin and the paired test of (difference + margin) is significant;
+    the test of (difference + margin) says that its mean is below zero;
 better
-    above +margin, and the test of (difference - margin) is significant;
+    the test of (difference - margin) says that it is above;
 equal
-    the bootstrap interval of the mean difference lies within the margin;
+    the 95 % bootstrap interval of the mean difference lies within the margin;
 not measurable
     with so few scenes that no test can reach the level after Holm's correction: the two-sided p of n paired
     differences cannot fall below ``2 ** (1 - n)``;
 undecided
     anything else: the data allow a difference beyond the margin as well as none.
 
-Holm's correction is over the indices of a detector, for each direction's test.
+Why an identical detector passes: with as many seeds on both sides, baseline and candidate could be exchanged, so the
+difference of each scene is symmetric about zero, however it scatters. The sign-flip test is exact for that, and the
+margin, which is added to every difference, can only raise its p. Holm's correction is over the indices of a detector,
+for one-sided tests in one direction: it holds however the indices hang together. So `worse` is said of an identical
+detector, on whichever index, in at most half of the level of all gate runs, and of a deterministic one never.
 """
 
 from __future__ import annotations
@@ -28,9 +32,9 @@ from ..reports.gate_text import GateResult, IndexVerdict, Verdict
 from ..scenes.errors import ParameterError, UnknownNameError
 from ..scenes.names import nearest_hint
 from .baseline import Baseline, Measured
-from .inference import LEVEL, bootstrap_interval, holm, lowest_p, paired_p, scenes_needed
+from .inference import bootstrap_interval, holm, lowest_p, scenes_needed, sign_flip_p
 
-__all__ = ["DEFAULT_INDICES", "compare", "different_scenes", "gated_indices", "margins_of"]
+__all__ = ["DEFAULT_INDICES", "GATE_LEVEL", "compare", "different_scenes", "gated_indices", "margins_of", "seeds_share"]
 
 #: What is gated when nothing is chosen: both kinds of error, of objects and of areas, and the outline's accuracy.
 DEFAULT_INDICES = (
@@ -40,6 +44,8 @@ DEFAULT_INDICES = (
     "pixel.correctness",
     "geometric.rmse",
 )
+#: Of 200 gate runs of an identical detector at most one says `worse`.
+GATE_LEVEL = 0.01
 #: Margins by unit: half a percent point, one percent of a ratio, two centimetres, a tenth of a pixel.
 DEFAULT_MARGINS = {"fraction": 0.005, "ratio": 0.01, "m": 0.02, "px": 0.1, "count": 0.0}
 
@@ -101,7 +107,7 @@ def compare(
     *,
     indices: Sequence[Index],
     margins: Mapping[str, float],
-    level: float = LEVEL,
+    level: float = GATE_LEVEL,
     extra: Sequence[IndexVerdict] = (),
 ) -> GateResult:
     """Return the verdicts of every detector that both have; the scenes must be the same."""
@@ -132,7 +138,7 @@ def compare_detector(
     *,
     indices: Sequence[Index],
     margins: Mapping[str, float],
-    level: float = LEVEL,
+    level: float = GATE_LEVEL,
 ) -> list[IndexVerdict]:
     """Return the verdict of every index of one detector."""
     pairs = [_pairs(before, after, index) for index in indices]
@@ -140,13 +146,13 @@ def compare_detector(
         [new - old if index.better == "higher" else old - new for old, new in found.values()]
         for index, found in zip(indices, pairs, strict=True)
     ]
-    worse = holm([paired_p([d + margins[i.key] for d in ds]) for i, ds in zip(indices, differences, strict=True)])
-    better = holm([paired_p([d - margins[i.key] for d in ds]) for i, ds in zip(indices, differences, strict=True)])
+    worse = _adjusted([[d + margins[i.key] for d in ds] for i, ds in zip(indices, differences, strict=True)])
+    better = _adjusted([[margins[i.key] - d for d in ds] for i, ds in zip(indices, differences, strict=True)])
     verdicts = []
     for place, index in enumerate(indices):
         found, ds, margin = pairs[place], differences[place], margins[index.key]
         effect = statistics.fmean(ds) if ds else None
-        low, high = bootstrap_interval(ds, level=level) or (None, None)
+        low, high = bootstrap_interval(ds) or (None, None)
         verdict: Verdict = "undecided"
         p: float | None = None
         note = ""
@@ -163,8 +169,11 @@ def compare_detector(
                 verdict, p = "better", better[place]
             elif -margin <= low and high <= margin:
                 verdict = "equal"
-            elif abs(effect) > margin:
-                p = worse[place] if effect < 0 else better[place]
+            else:
+                p = None if abs(effect) <= margin else worse[place] if effect < 0 else better[place]
+                share = seeds_share(before, after, index)
+                if share is not None and share >= 0.5:
+                    note = f"{label}: {share:.0%} of the scatter of {index.title} comes from seeds: more narrow it"
         verdicts.append(
             IndexVerdict(
                 detector=label,
@@ -184,13 +193,25 @@ def compare_detector(
     return verdicts
 
 
-def _by_scene(measured: Measured, index: Index) -> dict[str, float]:
+def _adjusted(differences: Sequence[Sequence[float]]) -> list[float]:
+    """Return Holm-adjusted two-sided p of differences below zero: twice the one-sided ones.
+
+    Corrected one-sided: a difference that is surely above zero must not lower the bar for the others.
+    """
+    return [min(1.0, 2 * p) for p in holm([sign_flip_p(found) for found in differences])]
+
+
+def _values(measured: Measured, index: Index) -> dict[str, list[float]]:
     values: dict[str, list[float]] = {}
     for (scene, _), found in measured.runs.items():
         value = None if found is None else found.get(index.key)
         if value is not None:
             values.setdefault(scene, []).append(value)
-    return {scene: statistics.fmean(found) for scene, found in values.items()}
+    return values
+
+
+def _by_scene(measured: Measured, index: Index) -> dict[str, float]:
+    return {scene: statistics.fmean(found) for scene, found in _values(measured, index).items()}
 
 
 def _pairs(before: Measured, after: Measured, index: Index) -> dict[str, tuple[float, float]]:
@@ -204,3 +225,20 @@ def _lost(label: str, before: Measured, after: Measured, index: Index) -> str:
     if not lost:
         return ""
     return f"{label}: {index.title} is undefined for the candidate on {len(lost)} scenes where the baseline has it"
+
+
+def seeds_share(before: Measured, after: Measured, index: Index) -> float | None:
+    """Return which share of the variance of the mean difference comes from seeds; None where nothing tells.
+
+    Each scene's difference of two means carries the variance over seeds divided by their number, on both sides; the
+    rest of the variance over scenes is how differently the change works on them.
+    """
+    old, new = _values(before, index), _values(after, index)
+    both = old.keys() & new.keys()
+    sides = [side[scene] for scene in both for side in (old, new)]
+    if len(both) < 2 or any(len(found) < 2 for found in sides):
+        return None
+    differences = [statistics.fmean(new[scene]) - statistics.fmean(old[scene]) for scene in both]
+    own = sum(statistics.variance(found) / len(found) for found in sides) / len(both)
+    total = statistics.variance(differences)
+    return min(1.0, own / total) if total else None

@@ -23,7 +23,7 @@ from ..evaluators.base import Index
 from ..reports.gate_text import IndexVerdict, Verdict
 from ..scenes.errors import UnsupportedError
 from .baseline import Baseline
-from .inference import LEVEL, bootstrap_interval, lowest_p, paired_p, scenes_needed
+from .inference import LEVEL, bootstrap_interval, lowest_p, scenes_needed, sign_flip_p
 from .isolation import IsolatedProcess, Limits
 from .tasks import Outcome, Task
 
@@ -44,7 +44,7 @@ _ROOT = __package__.rpartition(".")[0]
 
 
 def time_side_by_side(
-    baseline: Baseline, *, repeats: int = 3, margin: float = 0.1, level: float = LEVEL
+    baseline: Baseline, candidate: Baseline, *, repeats: int = 3, margin: float = 0.1, level: float = LEVEL
 ) -> list[IndexVerdict]:
     """Return a verdict on the run time of every detector of a baseline.
 
@@ -52,6 +52,8 @@ def time_side_by_side(
     ----------
     baseline : Baseline
         Its commit must be in the repository of the running code.
+    candidate : Baseline
+        Of the running code, with detectors named as in the baseline.
     repeats : int
         Runs of each side on every scene, of which the fastest counts.
     margin : float
@@ -67,7 +69,7 @@ def time_side_by_side(
         old, new = IsolatedProcess(python_path=old_path), IsolatedProcess()
         try:
             return [
-                _verdict(label, _log_ratios(baseline, label, old, new, repeats), margin, level)
+                _verdict(label, _log_ratios(baseline, candidate, label, old, new, repeats), margin, level)
                 for label in baseline.detectors
             ]
         finally:
@@ -96,19 +98,23 @@ def _unpacked(commit: str | None) -> Iterator[Path]:
 
 
 def _log_ratios(
-    baseline: Baseline, label: str, old: IsolatedProcess, new: IsolatedProcess, repeats: int
+    baseline: Baseline, candidate: Baseline, label: str, old: IsolatedProcess, new: IsolatedProcess, repeats: int
 ) -> list[float]:
     """Return the logarithm of new by old processor time of every scene on which both sides ran."""
-    measured = baseline.detectors[label]
+    sides = {old: baseline.detectors[label], new: candidate.detectors[label]}
     ratios = []
     for number, scene in enumerate(baseline.scenes.values()):
-        task = Task(scene=scene.recipe, detector=measured.recipe, seed=measured.seeds[0], evaluators=()).to_json()
+        tasks = {
+            side: Task(scene=scene.recipe, detector=found.recipe, seed=found.seeds[0], evaluators=()).to_json()
+            for side, found in sides.items()
+        }
         if number == 0:  # compilation and first reads belong to neither
-            old.call(task, Limits()), new.call(task, Limits())
+            for side, task in tasks.items():
+                side.call(task, Limits())
         seconds: dict[IsolatedProcess, list[float]] = {old: [], new: []}
         turns = itertools.islice(itertools.cycle([old, new, new, old]), 2 * repeats)
         for side in turns:
-            outcome = Outcome.from_bytes(side.call(task, Limits()))
+            outcome = Outcome.from_bytes(side.call(tasks[side], Limits()))
             if outcome.status == "ok":
                 seconds[side].append(outcome.cost.cpu_seconds)
         if seconds[old] and seconds[new] and min(seconds[old]) > 0 and min(seconds[new]) > 0:
@@ -120,7 +126,7 @@ def _verdict(label: str, ratios: Sequence[float], margin: float, level: float) -
     """Return the verdict on log ratios; positive is slower."""
     bound = math.log1p(margin)
     mean = statistics.fmean(ratios) if ratios else None
-    low, high = bootstrap_interval(ratios, level=level) or (None, None)
+    low, high = bootstrap_interval(ratios) or (None, None)
     verdict: Verdict = "undecided"
     p: float | None = None
     note = ""
@@ -128,10 +134,10 @@ def _verdict(label: str, ratios: Sequence[float], margin: float, level: float) -
         verdict = "not measurable"
         note = f"{label}: run time needs {scenes_needed(1, level)} scenes on which both versions ran, not {len(ratios)}"
     elif mean > bound:
-        p = paired_p([ratio - bound for ratio in ratios])
+        p = min(1.0, 2 * sign_flip_p([bound - ratio for ratio in ratios]))
         verdict = "worse" if p <= level else "undecided"
     elif mean < -bound:
-        p = paired_p([ratio + bound for ratio in ratios])
+        p = min(1.0, 2 * sign_flip_p([ratio + bound for ratio in ratios]))
         verdict = "better" if p <= level else "undecided"
     elif -bound <= low and high <= bound:
         verdict = "equal"

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ...scenes.errors import InputError, ParameterError
+from ...scenes.errors import InputError, ParameterError, UnknownNameError
 from .options import (
-    DEFAULT_STORE,
     DetectorOption,
     EvaluatorOption,
-    JobsOption,
-    MemoryLimitOption,
-    PluginOption,
-    QuietOption,
-    SchedulerOption,
-    StoreOption,
-    TimeLimitOption,
-    load_plugins,
+    RunOptions,
+    ScenesOption,
+    SeedsOption,
     messages,
-    read_limits,
     suite_from_words,
+    with_run_options,
 )
 from .progress import run_progress
 
@@ -30,8 +25,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..baseline import Baseline
-    from ..runner import Execution
-    from ..suite import Suite
+    from ..suite import Entrant, Suite
 
 baseline_app = typer.Typer(
     name="baseline", help="What a version of the code reached, for the gate.", no_args_is_help=True
@@ -44,28 +38,25 @@ def _baseline() -> None:
 
 
 @baseline_app.command("save")
+@with_run_options
 def save(
     output: Annotated[Path, typer.Option("--output", "-o", help="Baseline file, JSON, to be kept in git.")],
     suite: Annotated[str, typer.Option(help="Suite: TOML file or name.")] = "gate",
     detector: DetectorOption = None,
     evaluator: EvaluatorOption = None,
-    seeds: Annotated[int | None, typer.Option(min=1, help="Seeds 1 to N of every preset.", metavar="N")] = None,
-    detector_seeds: Annotated[int, typer.Option(min=1, help="Seeds of stochastic detectors given by -d.")] = 1,
-    jobs: JobsOption = 1,
-    scheduler: SchedulerOption = None,
-    time_limit: TimeLimitOption = None,
-    memory_limit: MemoryLimitOption = None,
-    store: StoreOption = DEFAULT_STORE,
-    plugin: PluginOption = None,
+    scenes: ScenesOption = None,
+    seeds: SeedsOption = None,
+    detector_seeds: Annotated[
+        int, typer.Option(min=1, help="Seeds of stochastic detectors given by -d: so many runs a scene.", metavar="N")
+    ] = 5,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")] = False,
-    quiet: QuietOption = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Run a suite and save what every detector reached; refused when the working tree has uncommitted changes."""
     from ...scenes.output import check_target
     from ..provenance import code_version
-    from ..runner import Execution
 
-    load_plugins(plugin)
     check_target(output, overwrite)
     version = code_version()
     if version.dirty:
@@ -76,9 +67,10 @@ def save(
     chosen = suite_from_words([suite], detector, evaluator, seeds=detector_seeds)
     if seeds is not None:
         chosen = chosen.with_seeds(seeds)
-    execution = Execution(jobs=jobs, scheduler=scheduler, limits=read_limits(time_limit, memory_limit))
-    told = messages(quiet)
-    measured, failed = _measure(chosen, store, execution, told)
+    if scenes is not None:
+        chosen = chosen.with_scenes(scenes)
+    told = messages(options.quiet)
+    measured, failed = _measure(chosen, options, told)
     measured.save(output, overwrite=overwrite)
     told.print(
         f"{output}: {len(measured.detectors)} detectors on {len(measured.scenes)} scenes, {version}", markup=False
@@ -87,6 +79,7 @@ def save(
         raise typer.Exit(3)
 
 
+@with_run_options
 def gate(
     baseline: Annotated[Path, typer.Argument(help="Baseline file.")],
     candidate: Annotated[
@@ -94,11 +87,15 @@ def gate(
     ] = None,
     suite: Annotated[str | None, typer.Option(help="Suite to measure instead of the baseline's own.")] = None,
     detector: DetectorOption = None,
+    scenes: ScenesOption = None,
     index: Annotated[list[str] | None, typer.Option(help="Index to gate; repeat for more.")] = None,
     margin: Annotated[
         list[str] | None, typer.Option(help="Difference taken as none, INDEX=NUMBER, such as object.quality=0.005.")
     ] = None,
-    level: Annotated[float, typer.Option(min=1e-6, max=0.5, help="Level of significance.")] = 0.05,
+    level: Annotated[
+        float | None,
+        typer.Option(min=1e-6, max=0.5, help="Twice the share of false alarms that is borne.", show_default="0.01"),
+    ] = None,
     time: Annotated[
         bool, typer.Option("--time", help="Gate run time, too: the baseline's commit and this code in turns.")
     ] = False,
@@ -107,15 +104,13 @@ def gate(
         Literal["table", "md", "json"], typer.Option("--format", "-f", help="How it is printed.")
     ] = "table",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write Markdown here as well.")] = None,
-    jobs: JobsOption = 1,
-    scheduler: SchedulerOption = None,
-    time_limit: TimeLimitOption = None,
-    memory_limit: MemoryLimitOption = None,
-    store: StoreOption = DEFAULT_STORE,
-    plugin: PluginOption = None,
-    quiet: QuietOption = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Say by paired tests over scenes whether a change has made a detector better or worse.
+
+    With -d only the detectors that it names are compared, each with the one of the same name in the baseline, with
+    --scenes only the scenes of that pattern.
 
     Exit code 1 when an index became worse or a run fails that did not, 4 when nothing could be measured or the scenes
     are not the same, else 0.
@@ -123,30 +118,38 @@ def gate(
     from ...reports.gate_text import format_gate
     from ...scenes.output import whole_file
     from ..baseline import Baseline
-    from ..gate import compare, different_scenes, gated_indices, margins_of
-    from ..runner import Execution
+    from ..gate import GATE_LEVEL, compare, different_scenes, gated_indices, margins_of
     from ..timing import time_side_by_side
 
-    load_plugins(plugin)
     before = Baseline.load(baseline)
+    if scenes is not None:
+        before = before.with_scenes(scenes)
     judge = before.evaluator.evaluator()
     indices = gated_indices(judge, index)
     margins = margins_of(margin or [], indices)
-    told = messages(quiet)
+    level = GATE_LEVEL if level is None else level
     if candidate is not None:
-        if suite is not None or detector:
-            raise ParameterError("a candidate file is measured already: leave out --suite and --detector")
+        if suite is not None or detector or time:
+            raise ParameterError("a candidate file is measured already: leave out --suite, --detector and --time")
         after = Baseline.load(candidate)
+        after = after if scenes is None else after.with_scenes(scenes)
     else:
-        execution = Execution(jobs=jobs, scheduler=scheduler, limits=read_limits(time_limit, memory_limit))
-        after, _ = _measure(_candidate_suite(before, suite, detector), store, execution, told)
-        after = after.with_labels_of(before)
+        if detector:
+            before, entrants = _named(before, detector)
+        else:
+            entrants = before.to_suite().entrants
+        chosen = replace(before.to_suite(), entrants=entrants)
+        if suite is not None:
+            chosen = replace(chosen, scenes=suite_from_words([suite], None, None).scenes)
+            chosen = chosen if scenes is None else chosen.with_scenes(scenes)
+        after, _ = _measure(chosen, options, messages(options.quiet))
+    after = after.with_labels_of(before)
     differences = different_scenes(before, after)
     if differences:
         for text in differences[:10]:
             typer.echo(f"Not comparable: {text}", err=True)
         raise typer.Exit(4)
-    extra = time_side_by_side(before, margin=time_margin, level=level) if time else []
+    extra = time_side_by_side(before, after, margin=time_margin, level=level) if time else []
     result = compare(before, after, indices=indices, margins=margins, level=level, extra=extra)
     typer.echo(format_gate(result, form))
     if output is not None:
@@ -155,23 +158,21 @@ def gate(
     raise typer.Exit(result.exit_code)
 
 
-def _candidate_suite(before: Baseline, suite: str | None, detectors: list[str] | None) -> Suite:
-    """Return what is measured: the baseline's scenes and detectors, unless told otherwise."""
-    from dataclasses import replace
-
+def _named(before: Baseline, selections: list[str]) -> tuple[Baseline, tuple[Entrant, ...]]:
+    """Return what the baseline has of the detectors that are named, and those to be run, with its seeds."""
     from ...detectors.registry import make_detector
     from ..suite import Entrant
 
-    chosen = before.to_suite()
-    if suite is not None:
-        chosen = replace(suite_from_words([suite], None, None), evaluators=chosen.evaluators, entrants=chosen.entrants)
-    if detectors:
-        seeds = max((entrant.seeds for entrant in chosen.entrants), key=len)
-        chosen = replace(chosen, entrants=tuple(Entrant(make_detector(name), seeds) for name in detectors))
-    return chosen
+    detectors = {entrant.label: entrant.detector for entrant in (Entrant(make_detector(name)) for name in selections)}
+    known = before.counterparts(list(detectors))
+    for label in detectors:
+        if label not in known:
+            raise UnknownNameError(f"the baseline has no detector {label!r}; it has {', '.join(before.detectors)}")
+    entrants = (Entrant(detector, before.detectors[known[label]].seeds) for label, detector in detectors.items())
+    return before.only(known.values()), tuple(entrants)
 
 
-def _measure(suite: Suite, store: Path, execution: Execution, told: Console) -> tuple[Baseline, int]:
+def _measure(suite: Suite, options: RunOptions, told: Console) -> tuple[Baseline, int]:
     """Run a suite; return what it reached, and how many runs failed."""
     from ...reports.tables import print_incidents
     from ..baseline import measure
@@ -181,7 +182,8 @@ def _measure(suite: Suite, store: Path, execution: Execution, told: Console) -> 
     from ..runner import run_plan
     from ..store import Store
 
-    with Store(store) as opened:
+    execution = options.execution()
+    with Store(options.store) as opened:
         plan = make_plan(suite, opened)
         with run_progress(plan, told) as report:
             result = run_plan(plan, opened, execution=execution, progress=report)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import os
 import re
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,24 +20,27 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..isolation import Limits
+    from ..runner import Execution
     from ..suite import Suite
 
 __all__ = [
     "DEFAULT_STORE",
     "DetectorOption",
+    "DetectorSeedsOption",
     "EvaluatorOption",
-    "JobsOption",
-    "MemoryLimitOption",
     "PluginOption",
     "QuietOption",
-    "SchedulerOption",
+    "RunOptions",
+    "ScenesOption",
+    "SeedsOption",
     "StoreOption",
-    "TimeLimitOption",
+    "WordsArgument",
     "load_plugins",
     "messages",
     "read_limits",
     "suite_from_words",
     "table_console",
+    "with_run_options",
 ]
 
 DEFAULT_STORE = Path("roofbench.sqlite")
@@ -51,19 +58,81 @@ PluginOption = Annotated[
     list[Path] | None,
     typer.Option("--plugin", help="Python file with detectors or evaluators of your own; repeat for more."),
 ]
-JobsOption = Annotated[
-    int, typer.Option("--jobs", "-j", min=0, help="Worker processes; 0: in this process, without limits.")
+WordsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[SUITE | SCENE...]",
+        help="A suite (TOML file or name), or scene folders and presets; 'quick' by default.",
+    ),
 ]
-SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", help="Dask scheduler, for instance tcp://host:8786.", metavar="URL")
+ScenesOption = Annotated[
+    str | None, typer.Option("--scenes", help="Only scenes whose name matches.", metavar="PATTERN")
 ]
-TimeLimitOption = Annotated[
-    float | None, typer.Option("--time-limit", min=0.001, help="Wall clock seconds that one run may take.")
-]
-MemoryLimitOption = Annotated[
-    str | None, typer.Option("--memory-limit", help="Memory that one run may take: 500M, 8G.", metavar="SIZE")
+SeedsOption = Annotated[int | None, typer.Option("--seeds", min=1, help="Seeds 1 to N of every preset.", metavar="N")]
+DetectorSeedsOption = Annotated[
+    int, typer.Option("--detector-seeds", min=1, help="Seeds of stochastic detectors given by -d.", metavar="N")
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no messages.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """What every command that runs detectors is told: where, within which limits, and where the results are kept.
+
+    The fields are the options, see `with_run_options`.
+    """
+
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", min=0, help="Worker processes; 0: in this process, without limits.")
+    ] = 1
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", help="Dask scheduler, for instance tcp://host:8786.", metavar="URL")
+    ] = None
+    time_limit: Annotated[
+        float | None, typer.Option("--time-limit", min=0.001, help="Wall clock seconds that one run may take.")
+    ] = None
+    memory_limit: Annotated[
+        str | None, typer.Option("--memory-limit", help="Memory that one run may take: 500M, 8G.", metavar="SIZE")
+    ] = None
+    store: StoreOption = DEFAULT_STORE
+    plugin: PluginOption = None
+    quiet: QuietOption = False
+
+    def execution(self) -> Execution:
+        """Return how runs are executed."""
+        from ..runner import Execution
+
+        if self.jobs == 0 and (self.time_limit is not None or self.memory_limit is not None):
+            raise ParameterError("limits need a worker process: use --jobs 1 or more")
+        limits = read_limits(self.time_limit, self.memory_limit)
+        return Execution(jobs=self.jobs, scheduler=self.scheduler, limits=limits)
+
+
+def with_run_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `RunOptions`, handed over in one piece as its parameter ``options``.
+
+    Plugins are registered before the command starts.
+    """
+    names = [option.name for option in fields(RunOptions)]
+    # Typer reads signatures: annotations are evaluated here, where the names in them are known.
+    own = inspect.signature(command, eval_str=True).parameters.values()
+    shared = inspect.signature(RunOptions, eval_str=True).parameters.values()
+    parameters = [
+        parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+        for parameter in (*own, *shared)
+        if parameter.name != "options"
+    ]
+
+    @functools.wraps(command)
+    def called(**values: Any) -> None:
+        options = RunOptions(**{name: values.pop(name) for name in names})
+        load_plugins(options.plugin)
+        command(**values, options=options)
+
+    called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    called.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return called
+
 
 _SIZE = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*([kKmMgG]?)(?:i?[bB])?\s*$")
 

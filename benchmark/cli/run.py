@@ -11,21 +11,17 @@ import typer
 
 from ...scenes.errors import ParameterError
 from .options import (
-    DEFAULT_STORE,
     DetectorOption,
+    DetectorSeedsOption,
     EvaluatorOption,
-    JobsOption,
-    MemoryLimitOption,
-    PluginOption,
-    QuietOption,
-    SchedulerOption,
-    StoreOption,
-    TimeLimitOption,
-    load_plugins,
+    RunOptions,
+    ScenesOption,
+    SeedsOption,
+    WordsArgument,
     messages,
-    read_limits,
     suite_from_words,
     table_console,
+    with_run_options,
 )
 from .progress import run_progress
 
@@ -34,31 +30,18 @@ if TYPE_CHECKING:
     from ..plan import Plan
 
 
+@with_run_options
 def run(
-    words: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[SUITE | SCENE...]",
-            help="A suite (TOML file or name), or scene folders and presets; 'quick' by default.",
-        ),
-    ] = None,
+    words: WordsArgument = None,
     detector: DetectorOption = None,
     evaluator: EvaluatorOption = None,
-    scenes: Annotated[str | None, typer.Option(help="Only scenes whose name matches.", metavar="PATTERN")] = None,
-    seeds: Annotated[int | None, typer.Option(min=1, help="Seeds 1 to N of every preset.", metavar="N")] = None,
-    detector_seeds: Annotated[
-        int, typer.Option(min=1, help="Seeds of stochastic detectors given by -d.", metavar="N")
-    ] = 1,
-    jobs: JobsOption = 1,
-    scheduler: SchedulerOption = None,
-    time_limit: TimeLimitOption = None,
-    memory_limit: MemoryLimitOption = None,
-    store: StoreOption = DEFAULT_STORE,
+    scenes: ScenesOption = None,
+    seeds: SeedsOption = None,
+    detector_seeds: DetectorSeedsOption = 1,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for report.html, leaderboard.csv and leaderboard.md.")
     ] = None,
     rank_by: Annotated[str | None, typer.Option(help="Index that ranks, for instance pixel.quality.")] = None,
-    plugin: PluginOption = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="List what would run and why the rest would not.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with what this store was last asked for.")] = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run only what failed before.")] = False,
@@ -66,7 +49,8 @@ def run(
         Literal["missing", "never", "always"],
         typer.Option(help="missing: all without a good result; never: not even failures again; always: everything."),
     ] = "missing",
-    quiet: QuietOption = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Run detectors on scenes and print the leaderboard; what the store holds already is not run again.
 
@@ -76,18 +60,15 @@ def run(
     from ..leaderboard import incidents_of, make_leaderboard, rank_index
     from ..plan import make_plan, plan_content, suite_from_content
     from ..report_data import fill_report
-    from ..runner import Execution, run_plan
+    from ..runner import run_plan
     from ..store import Store
     from .report import write_report
 
-    load_plugins(plugin)
-    limits = read_limits(time_limit, memory_limit)
-    if jobs == 0 and limits != read_limits(None, None):
-        raise ParameterError("limits need a worker process: use --jobs 1 or more")
+    execution = options.execution()
     if resume and words:
         raise ParameterError("--resume goes on with what the store was asked for: leave out the suite and scenes")
-    told = messages(quiet)
-    with Store(store, must_exist=resume) as opened:
+    told = messages(options.quiet)
+    with Store(options.store, must_exist=resume) as opened:
         suite = (
             suite_from_content(opened.last_plan())
             if resume
@@ -104,19 +85,15 @@ def run(
             return
         opened.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
         with run_progress(plan, told) as report:
-            result = run_plan(
-                plan,
-                opened,
-                execution=Execution(jobs=jobs, scheduler=scheduler, limits=limits),
-                overwrite=overwrite,
-                progress=report,
-            )
+            result = run_plan(plan, opened, execution=execution, overwrite=overwrite, progress=report)
         boards = [
             make_leaderboard(result.rows, opened, judge, title=f"Suite {suite.name}", rank_by=rank_by)
             for judge in plan.judges
         ]
         known = len(result.rows) - result.done
-        told.print(f"{result.done} runs done, {known} stored before, {len(result.failed)} failed; store {store}")
+        told.print(
+            f"{result.done} runs done, {known} stored before, {len(result.failed)} failed; store {options.store}"
+        )
         for number, board in enumerate(boards):
             if number:
                 typer.echo()

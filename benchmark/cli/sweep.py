@@ -9,20 +9,15 @@ import typer
 
 from ...scenes.errors import OutputError, ParameterError
 from .options import (
-    DEFAULT_STORE,
+    DetectorSeedsOption,
     EvaluatorOption,
-    JobsOption,
-    MemoryLimitOption,
-    PluginOption,
-    QuietOption,
-    SchedulerOption,
-    StoreOption,
-    TimeLimitOption,
-    load_plugins,
+    RunOptions,
+    SeedsOption,
+    WordsArgument,
     messages,
-    read_limits,
     suite_from_words,
     table_console,
+    with_run_options,
 )
 from .progress import run_progress
 
@@ -33,33 +28,26 @@ if TYPE_CHECKING:
     from ..sweep import Sweep
 
 
+@with_run_options
 def sweep(
     detectors: Annotated[str, typer.Argument(help="Detector, or several with commas between.", metavar="DETECTOR")],
-    words: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[SUITE | SCENE...]", help="As of roofbench run; 'quick' by default."),
-    ] = None,
+    words: WordsArgument = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(help="NAME=VALUE,VALUE,... or NAME=FROM:TO:STEP; scene.NAME: of the generator; repeat for more."),
     ] = None,
     grid: Annotated[bool, typer.Option("--grid", help="Vary all together, not one at a time.")] = False,
-    seeds: Annotated[int | None, typer.Option(min=1, help="Seeds 1 to N of every preset.", metavar="N")] = None,
-    detector_seeds: Annotated[int, typer.Option(min=1, help="Seeds of stochastic detectors.", metavar="N")] = 1,
+    seeds: SeedsOption = None,
+    detector_seeds: DetectorSeedsOption = 1,
     index: Annotated[str | None, typer.Option(help="Index that is printed, for instance pixel.quality.")] = None,
     level: Annotated[
         float | None, typer.Option(help="Tell where the index passes this level, for instance 0.8 for 80 %.")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Tidy table, .csv or .parquet.")] = None,
     evaluator: EvaluatorOption = None,
-    jobs: JobsOption = 1,
-    scheduler: SchedulerOption = None,
-    time_limit: TimeLimitOption = None,
-    memory_limit: MemoryLimitOption = None,
-    store: StoreOption = DEFAULT_STORE,
-    plugin: PluginOption = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an output file that exists.")] = False,
-    quiet: QuietOption = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Sweep detector parameters or axes of the generator; what the store holds already is not run again.
 
@@ -69,12 +57,10 @@ def sweep(
     from ...scenes.names import split_list
     from ...scenes.output import check_target
     from ..leaderboard import incidents_of, rank_index
-    from ..runner import Execution
     from ..store import Store
     from ..sweep import axis_of, break_downs, make_sweep, run_sweep
 
-    load_plugins(plugin)
-    limits = read_limits(time_limit, memory_limit)
+    execution = options.execution()
     if output is not None:
         if output.suffix.lower() not in (".csv", ".parquet"):
             raise OutputError(f"{output}: unknown file ending {output.suffix!r}: name it .csv or .parquet")
@@ -85,10 +71,9 @@ def sweep(
     shown = rank_index(suite.evaluators[0], index)
     if level is not None and shown.better == "neither":
         raise ParameterError(f"{shown.key} has no better direction, so no level to break down at")
-    told = messages(quiet)
-    with Store(store) as opened:
+    told = messages(options.quiet)
+    with Store(options.store) as opened:
         planned = make_sweep(suite, [axis_of(text) for text in vary or ()], opened, grid=grid)
-        execution = Execution(jobs=jobs, scheduler=scheduler, limits=limits)
         with run_progress(planned.plan, told) as report:
             table, rows = run_sweep(planned, opened, execution=execution, progress=report)
     _print(table, planned, shown)

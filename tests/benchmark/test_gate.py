@@ -1,5 +1,6 @@
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,9 +24,10 @@ MARGINS = margins_of([], INDICES)
 def measured(values, *, seeds=(0,), noise=0.0, shift=0.0, rng=None):
     """Values (scenes,) of all gated indices, with noise per run and a shift for the worse."""
     runs = {}
+    noises = np.broadcast_to(noise, len(values))
     for number, value in enumerate(values):
         for seed in seeds:
-            noisy = value + (rng.normal(0, noise) if noise else 0.0)
+            noisy = value + (rng.normal(0, noises[number]) if rng is not None else 0.0)
             runs[f"s-{number}", seed] = {
                 index.key: noisy - shift if index.better == "higher" else 1 - noisy + shift for index in INDICES
             }
@@ -65,13 +67,43 @@ def test_the_same_results_are_equal_fifty_times_of_fifty():
         assert result.exit_code == 0
 
 
-def test_a_stochastic_detector_with_fresh_seeds_passes_fifty_times_of_fifty():
+@pytest.mark.parametrize("seeds", [1, 5])
+def test_a_stochastic_detector_with_fresh_seeds_passes_fifty_times_of_fifty(seeds):
     for repeat in range(50):
         rng = np.random.default_rng(repeat)
         values = rng.uniform(0.6, 0.95, 12)
-        before = measured(values, seeds=(0, 1, 2), noise=0.01, rng=rng)
-        after = measured(values, seeds=(3, 4, 5), noise=0.01, rng=rng)
+        noise = rng.choice([0, 0.01, 0.08], 12)  # steady on some scenes, wild on others
+        before, after = (
+            measured(values, seeds=tuple(range(start, start + seeds)), noise=noise, rng=rng) for start in (0, seeds)
+        )
         assert gate(before, after, 12).exit_code == 0
+
+
+def test_an_index_that_surely_improves_does_not_lower_the_bar_for_the_others():
+    rng = np.random.default_rng(4)
+
+    def noise():
+        return {(f"s-{n}", 0): {index.key: rng.normal() for index in INDICES} for n in range(12)}
+
+    alarms = 0
+    for _ in range(300):
+        before, after = (Measured(PluginRecipe("d", {}), (0,), noise()) for _ in range(2))
+        for run in after.runs.values():
+            run["object.completeness"] += 5
+        alarms += gate(before, after, 12, margins=dict.fromkeys(MARGINS, 0.0), level=0.2).exit_code == 1
+    assert alarms <= 1.4 * 300 * 0.2 / 2
+
+
+def test_scatter_over_seeds_is_told_apart_from_scatter_over_scenes(values):
+    rng = np.random.default_rng(6)
+    before, after = (measured(values, seeds=seeds, noise=0.05, rng=rng) for seeds in ((0, 1, 2), (3, 4, 5)))
+    result = gate(before, after, 16)
+    assert verdicts(result) == {"undecided"}
+    assert all("comes from seeds: more narrow it" in verdict.note for verdict in result.verdicts)
+    steady = rng.normal(0, 0.05, 16)  # the change works differently on every scene, seeds hardly matter
+    before = measured(values, seeds=(0, 1, 2), noise=0.001, rng=rng)
+    after = measured(values + steady, seeds=(3, 4, 5), noise=0.001, rng=rng)
+    assert {verdict.note for verdict in gate(before, after, 16).verdicts} == {""}
 
 
 def test_a_planted_drop_is_found(values):
@@ -99,7 +131,7 @@ def test_noise_that_allows_both_is_undecided(values):
 def test_five_scenes_are_not_measurable_and_exit_4(values):
     result = gate(measured(values[:5]), measured(values[:5], shift=0.5), 5)
     assert (verdicts(result), result.exit_code) == ({"not measurable"}, 4)
-    assert "d: 5 indices at level 0.05 need 8 scenes where both sides are defined, not 5" in result.verdicts[0].note
+    assert "d: 5 indices at level 0.01 need 10 scenes where both sides are defined, not 5" in result.verdicts[0].note
 
 
 def test_a_run_that_fails_now_is_a_regression(values):
@@ -188,7 +220,7 @@ def suite_text(misbehaving, seeds):
 
 
 def test_the_command_line_exits_0_1_and_4(cli, misbehaving, tmp_path):
-    (tmp_path / "little.toml").write_text(suite_text(misbehaving, 8))
+    (tmp_path / "little.toml").write_text(suite_text(misbehaving, 10))
     saved = cli("baseline", "save", "-o", "b.json", "--suite", "little.toml", "-j", 0)
     assert saved.exit_code == 0, saved.output
     same = cli("gate", "b.json", "-j", 0)
@@ -199,7 +231,10 @@ def test_the_command_line_exits_0_1_and_4(cli, misbehaving, tmp_path):
     assert "🔴 worse" in shrunk.stdout
     assert (tmp_path / "gate.md").read_text() == shrunk.stdout
     few = json.loads((tmp_path / "b.json").read_text())
-    assert len(few["scenes"]) == 8
+    assert len(few["scenes"]) == 10
+    part = cli("gate", "b.json", "--scenes", "hamlet-[1-5]", "-j", 0)
+    assert part.exit_code == 4
+    assert "5 indices at level 0.01 need 10 scenes where both sides are defined, not 5" in part.stdout
 
     (tmp_path / "few.toml").write_text(suite_text(misbehaving, 5))
     cli("baseline", "save", "-o", "few.json", "--suite", "few.toml", "-j", 0)
@@ -207,6 +242,31 @@ def test_the_command_line_exits_0_1_and_4(cli, misbehaving, tmp_path):
     other = cli("gate", "b.json", "few.json")
     assert other.exit_code == 4
     assert "Not comparable: scene hamlet-6 is only in the baseline" in other.stderr
+
+
+def test_the_gate_suite_cut_to_five_scenes_is_not_measurable(cli):
+    saved = cli("baseline", "save", "-o", "b.json", "-d", "ndsm", "--scenes", "knox-small-[1-5]", "-j", 0)
+    assert saved.exit_code == 0, saved.output
+    assert len(json.loads(Path("b.json").read_text())["scenes"]) == 5
+    result = cli("gate", "b.json", "-d", "ndsm[height=8]", "-j", 0)
+    assert result.exit_code == 4
+    assert result.stdout.count("not measurable") == 6  # five indices and the summary
+    assert "Gate nothing could be measured" in result.stdout
+
+
+def test_only_the_detectors_that_are_named_are_compared(cli, misbehaving, tmp_path):
+    (tmp_path / "little.toml").write_text(
+        suite_text(misbehaving, 10) + '[[detectors]]\nuse = "ndsm"\n[[detectors]]\nuse = "ndsm"\nheight = 2\n'
+    )
+    assert cli("baseline", "save", "-o", "b.json", "--suite", "little.toml", "-j", 0).exit_code == 0
+    one = cli("gate", "b.json", "-d", "ndsm", "-j", 0)
+    assert one.exit_code == 0
+    assert "misbehaving" not in one.stdout
+    with pytest.raises(RoofbenchError, match="has no detector 'original'; it has misbehaving, ndsm, "):
+        cli("gate", "b.json", "-d", "original", "-j", 0)
+    sides = [f"{misbehaving}[side={side}]" for side in (7, 9)]
+    with pytest.raises(RoofbenchError, match="can be compared with one only"):
+        cli("gate", "b.json", "-d", sides[0], "-d", sides[1], "-j", 0)
 
 
 def test_a_dirty_tree_cannot_become_a_baseline(cli, monkeypatch):
@@ -230,7 +290,7 @@ def test_run_time_is_compared_side_by_side(monkeypatch, tmp_path, misbehaving):
     scenes = {f"hamlet-{n}": BaselineScene(SceneRecipe.of_preset("hamlet", seed=n), "") for n in range(2)}
     recipe = PluginRecipe(misbehaving, {"seconds": 0.001})
     one = replace(baseline(measured([0.5]), 1), scenes=scenes, detectors={"d": Measured(recipe, (0,), {})})
-    (verdict,) = timing.time_side_by_side(one, repeats=1)
+    (verdict,) = timing.time_side_by_side(one, one, repeats=1)
     assert (verdict.verdict, verdict.scenes) == ("not measurable", 2)
     assert "run time needs 6 scenes" in verdict.note
     assert 0.05 < verdict.candidate < 20
@@ -258,4 +318,4 @@ def test_a_baseline_without_a_commit_cannot_be_timed():
 
     unknown = replace(baseline(measured([0.5]), 1), version=CodeVersion("1", None, False))
     with pytest.raises(RoofbenchError, match="names no commit"):
-        time_side_by_side(unknown)
+        time_side_by_side(unknown, unknown)

@@ -12,6 +12,7 @@ from roofbench.benchmark.inference import (
     lowest_p,
     paired_p,
     scenes_needed,
+    sign_flip_p,
 )
 
 
@@ -23,6 +24,23 @@ def naive_sign_flip(differences):
 @given(st.lists(st.integers(-20, 20), min_size=1, max_size=9))
 def test_the_sign_flip_test_is_the_enumeration_of_all_signs(differences):
     assert paired_p(differences) == pytest.approx(naive_sign_flip(differences) if any(differences) else 1.0)
+
+
+@given(st.lists(st.integers(-4096, 4096), min_size=17, max_size=20), st.integers(0, 20))
+def test_many_differences_are_judged_as_by_enumeration(differences, zeros):
+    differences = [4096, *differences[: 20 - zeros], *[0] * zeros]  # the largest is the unit of the lattice
+    sums = np.zeros(1, dtype=int)
+    for difference in differences:
+        sums = np.concatenate([sums + difference, sums - difference])
+    assert sign_flip_p(differences) == pytest.approx((sums <= sum(differences)).mean())
+
+
+@given(st.lists(st.floats(-1, 1), min_size=1, max_size=40), st.floats(0, 2))
+def test_a_margin_never_makes_it_easier_to_be_worse(differences, margin):
+    with_margin = [difference + margin for difference in differences]
+    # beyond 16 differences the unit of the lattice changes with the largest one
+    slack = 1e-12 if len(differences) <= 16 else 0.01
+    assert sign_flip_p(with_margin) >= sign_flip_p(differences) - slack
 
 
 @given(st.lists(st.floats(-1, 1), min_size=1, max_size=12), st.floats(0.001, 1000))
@@ -45,6 +63,12 @@ def test_five_scenes_can_never_reach_five_percent():
 
 def test_no_difference_gives_p_of_one():
     assert paired_p([]) == paired_p([0.0] * 30) == 1.0
+
+
+def test_the_test_holds_its_level_where_most_differences_are_zero_and_some_are_wild():
+    rng = np.random.default_rng(2)
+    wild = [rng.choice([-1, 0, 0, 1], 30) * rng.lognormal(0, 2, 30) for _ in range(400)]
+    assert np.mean([sign_flip_p(differences) <= 0.05 for differences in wild]) < 0.08
 
 
 @pytest.mark.parametrize("count", [8, 25])
