@@ -19,6 +19,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...scenes.errors import ParameterError
 from ...scenes.footprints import Footprints
 from ...scenes.ground import fill_unknown, ground_surface
 from ...scenes.parameters import parameter
@@ -39,7 +40,7 @@ from .random_stream import stream
 from .rectangles import to_world
 from .roofs import KINDS, fit_roof
 from .superstructures import lower_superstructures
-from .tables import Tables, make_tables
+from .tables import LONGEST, Tables, make_tables
 from .tiles import Tile, tiles_of, work_off
 from .walls import close_walls
 
@@ -219,6 +220,12 @@ class MPP(Detector):
         else:
             ground = ground_surface(points, scene.extent)
         cell = self.cell or cell_size(points.x, points.y, scene.extent)
+        if math.sqrt(2) * self.largest_side > LONGEST * cell:
+            raise ParameterError(
+                f"mpp: largest_side of {self.largest_side:g} m is too long for cells of {cell:g} m; a rectangle must "
+                f"not reach over more than {LONGEST} cells: lower it to {math.floor(LONGEST * cell / math.sqrt(2))}, "
+                f"or raise cell"
+            )
         grid = Grid.covering(scene.extent, cell)
         low = 0.8 * self.least_height
         cells = make_cells(points, ground, grid, low=low, workers=pool, bands=self.workers)

@@ -16,9 +16,9 @@ import numpy as np
 from numba import njit
 
 from .rectangles import overlap_area
-from .roofs import fit_roof
+from .roofs import choose_roof, log_likelihood, scan
 
-__all__ = ["Model", "configuration_energy", "overlaps", "own_energy"]
+__all__ = ["Model", "configuration_energy", "energy_below", "least_energy", "overlaps", "own_energy"]
 
 
 class Model(NamedTuple):
@@ -58,20 +58,40 @@ class Model(NamedTuple):
 @njit(cache=True, nogil=True)
 def own_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def]
     """Return the energy of a rectangle by itself."""
+    return energy_below(small, large, rectangle, model, np.inf)
+
+
+@njit(cache=True, nogil=True)
+def energy_below(small, large, rectangle, model, limit):  # type: ignore[no-untyped-def]
+    """Return the energy of a rectangle by itself if it is less than a limit, else some number that is not.
+
+    Most proposals are refused. What no roof could make good enough is given up without looking for its roof.
+    """
     if model.weight == 0.0:
         return model.price
-    fit = np.empty(5)
-    likelihood, score, outside = fit_roof(
-        small,
-        large,
-        rectangle,
-        model.roof_price / (model.weight * model.fit_weight),
-        model.least_tau,
-        model.least_height,
-        model.cell,
-        fit,
+    moments = scan(small, large, rectangle)
+    base = model.price - model.weight * (moments[0] - model.void_price * moments[1])
+    share = model.weight * model.fit_weight
+    if share == 0.0:
+        return base
+    needed = (base - limit) / share
+    if max(log_likelihood(moments[2], 0.0, model.least_tau), 0.0) <= needed:
+        return np.inf
+    roof_price = model.roof_price / share
+    likelihood, _, _, _ = choose_roof(
+        small, large, rectangle, moments, roof_price, model.least_tau, model.least_height, model.cell, needed
     )
-    return model.price - model.weight * (model.fit_weight * likelihood + score - model.void_price * outside)
+    return base - share * likelihood
+
+
+@njit(cache=True, nogil=True)
+def least_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def]
+    """Return a bound that the energy of a rectangle by itself is not less than, from its scan alone."""
+    if model.weight == 0.0:
+        return model.price
+    moments = scan(small, large, rectangle)
+    most = max(log_likelihood(moments[2], 0.0, model.least_tau), 0.0)
+    return model.price - model.weight * (moments[0] - model.void_price * moments[1] + model.fit_weight * most)
 
 
 @njit(cache=True, nogil=True)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .energy import overlaps, own_energy
+from .energy import energy_below, least_energy, overlaps, own_energy
 
 __all__ = ["polish"]
 
@@ -72,9 +72,10 @@ def _descend(small, large, model, window, rectangles, own, count, fixed, i):  # 
             _change(rectangles[i], kind, step, new)
             if not _allowed(new, window, model):
                 continue
-            alone = own_energy(small, large, new, model)
             # Overlap is never negative, so what the data refuse need not be compared with the neighbours.
-            if alone >= own[i] + model.overlap * shared - _GAIN:
+            limit = own[i] + model.overlap * shared - _GAIN
+            alone = energy_below(small, large, new, model, limit)
+            if alone >= limit:
                 continue
             common = _shared(rectangles, count, fixed, new, i, -1)
             delta = alone - own[i] + model.overlap * (common - shared)
@@ -116,8 +117,9 @@ def _split(small, large, model, window, rectangles, own, count, fixed, i):  # ty
             _part(parent, axis, at, 0.5 * side, second)
             if not (_allowed(first, window, model) and _allowed(second, window, model)):
                 continue
-            energy = own_energy(small, large, first, model)
-            energy += own_energy(small, large, second, model)
+            energy = energy_below(small, large, first, model, best - least_energy(small, large, second, model))
+            if energy < np.inf:
+                energy += energy_below(small, large, second, model, best - energy)
             if energy < best:
                 best, best_axis, best_at = energy, axis, at
     if best_axis < 0:
@@ -178,8 +180,9 @@ def _merge(small, large, model, window, rectangles, own, count, fixed, i):  # ty
         # A hull much larger than its parts covers what neither wanted.
         if merged[2] * merged[3] > 1.6 * filled or not _allowed(merged, window, model):
             continue
-        alone = own_energy(small, large, merged, model)
-        if alone >= own[i] + own[j] + model.overlap * filled - _GAIN:
+        limit = own[i] + own[j] + model.overlap * filled - _GAIN
+        alone = energy_below(small, large, merged, model, limit)
+        if alone >= limit:
             continue
         before = (
             own[i]
@@ -201,15 +204,12 @@ def _merge(small, large, model, window, rectangles, own, count, fixed, i):  # ty
 
 
 @njit(cache=True, nogil=True)
-def _replace(small, large, model, window, rectangles, own, fresh, count, fixed, boxes):  # type: ignore[no-untyped-def]
+def _replace(model, rectangles, own, fresh, count, fixed, boxes, alones):  # type: ignore[no-untyped-def]
     """Put boxes in the place of the buildings that they overlap where that lowers the energy; return gain and count."""
     gained = 0.0
     victims = np.empty(len(rectangles), dtype=np.int64)
     for k in range(len(boxes)):
-        box = boxes[k]
-        if not _allowed(box, window, model):
-            continue
-        alone = own_energy(small, large, box, model)
+        box, alone = boxes[k], alones[k]
         if alone >= -_GAIN:
             continue
         many = 0
@@ -275,14 +275,16 @@ def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps): 
     count = min(len(start), capacity)
     for i in range(count):
         rectangles[i], own[i] = start[i], own_energy(small, large, start[i], model)
+    alones = np.full(len(boxes), np.inf)
+    for j in range(len(boxes)):
+        if _allowed(boxes[j], window, model):
+            alones[j] = energy_below(small, large, boxes[j], model, -_GAIN)
     gained = 0.0
     for sweep in range(sweeps):
         before = gained
         for j in range(len(boxes)):
-            if count >= capacity or not _allowed(boxes[j], window, model):
-                continue
-            alone = own_energy(small, large, boxes[j], model)
-            if alone >= -_GAIN:
+            alone = alones[j]
+            if count >= capacity or alone >= -_GAIN:
                 continue
             delta = alone + model.overlap * _shared(rectangles, count, fixed, boxes[j], -1, -1)
             if delta < -_GAIN:
@@ -290,7 +292,7 @@ def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps): 
                 fresh[count] = True
                 count += 1
                 gained -= delta
-        more, count = _replace(small, large, model, window, rectangles, own, fresh, count, fixed, boxes)
+        more, count = _replace(model, rectangles, own, fresh, count, fixed, boxes, alones)
         gained += more
         i = 0
         while i < count:

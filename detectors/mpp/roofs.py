@@ -3,8 +3,8 @@
 Nouns
 -----
 moments
-    n, sums of x, y, xx, xy, yy, h, xh, yh, hh over high cells (lengths in cells from the centre, heights in metres),
-    of each of four faces, shape (4, 10). Faces of a scan by quadrants: bit 0 set where u >= 0, bit 1 where v >= 0.
+    n, sums of u, v, uu, uv, vv, h, uh, vh, hh over the high cells of a rectangle: place u, v in cells from the centre
+    along its sides, height in metres.
 roof
     A surface over the rectangle: `FLAT` h = m; `PLANE` h = m + p u + q v; `GABLE_U`, `GABLE_V` h = m - s t with
     t = |v| (ridge along u) or |u|; `HIP` with t = max(|v|, |u| - (a - b)/2) for a >= b (a pyramid when a = b).
@@ -22,10 +22,21 @@ import math
 import numpy as np
 from numba import njit
 
-from .rectangles import row_span
-from .tables import MILLI
+from .tables import MILLI, part_sums
 
-__all__ = ["FLAT", "GABLE_U", "GABLE_V", "HIP", "KINDS", "PLANE", "fit_roof", "log_likelihood", "scan"]
+__all__ = [
+    "FLAT",
+    "GABLE_U",
+    "GABLE_V",
+    "HIP",
+    "KINDS",
+    "PLANE",
+    "choose_roof",
+    "fit_roof",
+    "log_likelihood",
+    "scan",
+    "scan_halves",
+]
 
 FLAT, PLANE, GABLE_U, GABLE_V, HIP = 0, 1, 2, 3, 4
 #: Names of the roofs, by their number.
@@ -41,62 +52,28 @@ def _first_cell(x):  # type: ignore[no-untyped-def]
     return 1048576 - int(1048576.5 - x)
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _add(small, large, row, first, last, sums, face):  # type: ignore[no-untyped-def]
-    """Add the cells first..last of a row to the whole-number sums of a face."""
-    n = np.int64(small[row, last, 0] - small[row, first, 0])
-    x = np.int64(small[row, last, 1] - small[row, first, 1])
-    h = np.int64(small[row, last, 2] - small[row, first, 2])
-    sums[face, 0] += n
-    sums[face, 1] += x
-    sums[face, 2] += row * n
-    sums[face, 3] += large[row, last, 0] - large[row, first, 0]
-    sums[face, 4] += row * x
-    sums[face, 5] += row * row * n
-    sums[face, 6] += h
-    sums[face, 7] += large[row, last, 1] - large[row, first, 1]
-    sums[face, 8] += row * h
-    sums[face, 9] += large[row, last, 2] - large[row, first, 2]
-
-
 @njit(cache=True, nogil=True)
-def _centre(sums, cx, cy, cos, sin, moments):  # type: ignore[no-untyped-def]
-    """Turn whole-number sums into moments along u and v about the centre, heights in metres.
+def _lines(rectangle):  # type: ignore[no-untyped-def]
+    """Return cos, sin and half the height of a rectangle, and slope and reach in x of the strips that it is made of.
 
-    The origin is first moved to the cell of the centre in whole numbers, so that nothing depends on where the grid
-    begins.
+    In the row at dy from the centre |u| <= a/2 is |dx - dy slope_u| <= reach_u, and |v| <= b/2 the same with v.
     """
-    x0, y0 = np.int64(math.floor(cx)), np.int64(math.floor(cy))
-    ox, oy = x0 + 0.5 - cx, y0 + 0.5 - cy
-    for q in range(sums.shape[0]):
-        count = sums[q, 0]
-        m = moments[q]
-        if count == 0:
-            m[:] = 0.0
-            continue
-        x_0, y_0 = sums[q, 1] - x0 * count, sums[q, 2] - y0 * count
-        xx_0 = sums[q, 3] - 2 * x0 * sums[q, 1] + x0 * x0 * count
-        yy_0 = sums[q, 5] - 2 * y0 * sums[q, 2] + y0 * y0 * count
-        xy_0 = sums[q, 4] - y0 * sums[q, 1] - x0 * sums[q, 2] + x0 * y0 * count
-        n, h = float(count), 0.01 * sums[q, 6]
-        x, y = x_0 + ox * n, y_0 + oy * n
-        xx = xx_0 + 2.0 * ox * x_0 + ox * ox * n
-        yy = yy_0 + 2.0 * oy * y_0 + oy * oy * n
-        xy = xy_0 + ox * y_0 + oy * x_0 + ox * oy * n
-        xh = 0.01 * (sums[q, 7] - x0 * sums[q, 6]) + ox * h
-        yh = 0.01 * (sums[q, 8] - y0 * sums[q, 6]) + oy * h
-        m[0], m[1], m[2] = n, x * cos + y * sin, y * cos - x * sin
-        m[3] = xx * cos * cos + 2.0 * xy * cos * sin + yy * sin * sin
-        m[4] = (yy - xx) * cos * sin + xy * (cos * cos - sin * sin)
-        m[5] = xx * sin * sin - 2.0 * xy * cos * sin + yy * cos * cos
-        m[6] = h
-        m[7], m[8] = xh * cos + yh * sin, yh * cos - xh * sin
-        m[9] = 1e-4 * sums[q, 9]
+    cos, sin = math.cos(rectangle[4]), math.sin(rectangle[4])
+    half_a, half_b = 0.5 * rectangle[2], 0.5 * rectangle[3]
+    tall = half_a * abs(sin) + half_b * abs(cos)
+    slope_u, reach_u, slope_v, reach_v = 0.0, np.inf, 0.0, np.inf
+    if abs(cos) > 1e-12:
+        slope_u, reach_u = -sin / cos, half_a / abs(cos)
+    if abs(sin) > 1e-12:
+        slope_v, reach_v = cos / sin, half_b / abs(sin)
+    return cos, sin, tall, slope_u, reach_u, slope_v, reach_v
 
 
 @njit(cache=True, nogil=True)
-def scan(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
-    """Fill the moments of the four quadrants of a rectangle, about its centre along u and v.
+def scan(small, large, rectangle):  # type: ignore[no-untyped-def]
+    """Add up the cells of a rectangle.
+
+    Sums are whole numbers about the cell of the centre, so that nothing depends on where the grid begins.
 
     Returns
     -------
@@ -104,18 +81,20 @@ def scan(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
         Sum of the scores of its cells, nats.
     outside : float
         How many of its cells are not on the grid.
+    n, u, v, uu, uv, vv, h, uh, vh, hh : float
+        Its moments.
     """
     rows, columns = small.shape[0], small.shape[1] - 1
-    cx, cy, half_a, half_b = rectangle[0], rectangle[1], 0.5 * rectangle[2], 0.5 * rectangle[3]
-    cos, sin = math.cos(rectangle[4]), math.sin(rectangle[4])
-    sums = np.zeros((4, 10), dtype=np.int64)
-    score, outside = 0, 0
-    tangent = sin / cos if abs(cos) > 1e-12 else 1e12
-    cotangent = cos / sin if abs(sin) > 1e-12 else 1e12
-    tall = half_a * abs(sin) + half_b * abs(cos)
+    cx, cy = rectangle[0], rectangle[1]
+    cos, sin, tall, slope_u, reach_u, slope_v, reach_v = _lines(rectangle)
+    x0, y0 = np.int64(math.floor(cx)), np.int64(math.floor(cy))
+    zero = np.int64(0)
+    score, outside, n, x, y, xx, xy, yy = zero, zero, zero, zero, zero, zero, zero, zero
+    h, xh, yh, hh = zero, zero, zero, zero
     for row in range(_first_cell(cy - tall), _first_cell(cy + tall)):
         dy = row + 0.5 - cy
-        lo, hi = row_span(dy, half_a, half_b, cos, sin)
+        lo = max(dy * slope_u - reach_u, dy * slope_v - reach_v)
+        hi = min(dy * slope_u + reach_u, dy * slope_v + reach_v)
         if not lo < hi:
             continue
         first, last = _first_cell(cx + lo), _first_cell(cx + hi)
@@ -129,41 +108,114 @@ def scan(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
         score += small[row, right, 3] - small[row, left, 3]
         if small[row, right, 0] == small[row, left, 0]:
             continue
-        # Where the row crosses u = 0 and v = 0.
-        cut_u, cut_v = -dy * tangent, dy * cotangent
-        near, far = min(cut_u, cut_v), max(cut_u, cut_v)
-        begin = left
-        for part in range(3):
-            end = right
-            if part == 0:
-                end = min(max(_first_cell(cx + near), left), right) if near < hi else right
-            elif part == 1:
-                end = min(max(_first_cell(cx + far), left), right) if far < hi else right
-            if end > begin:
-                dx = 0.5 * (begin + end) - cx
-                q = (1 if dx * cos + dy * sin >= 0.0 else 0) + (2 if dy * cos - dx * sin >= 0.0 else 0)
-                _add(small, large, row, begin, end, sums, q)
-                begin = end
-    _centre(sums, cx, cy, cos, sin, moments)
-    return score / MILLI, float(outside)
+        j = row - y0
+        n_r, x_r, xx_r, h_r, xh_r, hh_r = part_sums(small, large, row, left, right, x0)
+        n += n_r
+        x += x_r
+        y += j * n_r
+        xx += xx_r
+        xy += j * x_r
+        yy += j * j * n_r
+        h += h_r
+        xh += xh_r
+        yh += j * h_r
+        hh += hh_r
+    ox, oy = x0 + 0.5 - cx, y0 + 0.5 - cy
+    size, height = float(n), 0.01 * h
+    fx, fy = x + ox * size, y + oy * size
+    fxx, fyy = xx + 2.0 * ox * x + ox * ox * size, yy + 2.0 * oy * y + oy * oy * size
+    fxy = xy + ox * y + oy * x + ox * oy * size
+    fxh, fyh = 0.01 * xh + ox * height, 0.01 * yh + oy * height
+    return (
+        score / MILLI,
+        float(outside),
+        size,
+        fx * cos + fy * sin,
+        fy * cos - fx * sin,
+        fxx * cos * cos + 2.0 * fxy * cos * sin + fyy * sin * sin,
+        (fyy - fxx) * cos * sin + fxy * (cos * cos - sin * sin),
+        fxx * sin * sin - 2.0 * fxy * cos * sin + fyy * cos * cos,
+        height,
+        fxh * cos + fyh * sin,
+        fyh * cos - fxh * sin,
+        1e-4 * hh,
+    )
 
 
 @njit(cache=True, nogil=True)
-def _scan_hip(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
-    """Fill the moments of the four faces of a hip roof: 0, 1 the sides v < 0, v >= 0; 2, 3 the ends u < 0, u >= 0.
-
-    The rectangle is given with a >= b.
-    """
+def scan_halves(small, large, rectangle):  # type: ignore[no-untyped-def]
+    """Return the sums of u and uh over the cells with u > 0, and of v and vh over those with v > 0."""
     rows, columns = small.shape[0], small.shape[1] - 1
-    cx, cy, half_a, half_b = rectangle[0], rectangle[1], 0.5 * rectangle[2], 0.5 * rectangle[3]
-    cos, sin = math.cos(rectangle[4]), math.sin(rectangle[4])
-    ridge = half_a - half_b
-    sums = np.zeros((4, 10), dtype=np.int64)
-    cuts = np.empty(6)
-    tall = half_a * abs(sin) + half_b * abs(cos)
+    cx, cy = rectangle[0], rectangle[1]
+    cos, sin, tall, slope_u, reach_u, slope_v, reach_v = _lines(rectangle)
+    # The sides of the lines u = 0 and v = 0: u > 0 is right of its line where cos > 0, v > 0 left of its where sin > 0.
+    right_u, right_v = cos > 0.0, sin < 0.0
+    x0, y0 = np.int64(math.floor(cx)), np.int64(math.floor(cy))
+    zero = np.int64(0)
+    n_u, x_u, y_u, h_u, xh_u, yh_u = zero, zero, zero, zero, zero, zero
+    n_v, x_v, y_v, h_v, xh_v, yh_v = zero, zero, zero, zero, zero, zero
     for row in range(max(_first_cell(cy - tall), 0), min(_first_cell(cy + tall), rows)):
         dy = row + 0.5 - cy
-        lo, hi = row_span(dy, half_a, half_b, cos, sin)
+        lo = max(dy * slope_u - reach_u, dy * slope_v - reach_v)
+        hi = min(dy * slope_u + reach_u, dy * slope_v + reach_v)
+        if not lo < hi:
+            continue
+        left, right = min(max(_first_cell(cx + lo), 0), columns), min(max(_first_cell(cx + hi), 0), columns)
+        if right <= left or small[row, right, 0] == small[row, left, 0]:
+            continue
+        j = row - y0
+        begin, end = left, right
+        if abs(cos) <= 1e-12:
+            end = right if dy * sin > 0.0 else left
+        else:
+            cut = min(max(_first_cell(cx + min(max(dy * slope_u, lo), hi)), left), right)
+            begin, end = (cut, right) if right_u else (left, cut)
+        if end > begin:
+            n_r, x_r, _, h_r, xh_r, _ = part_sums(small, large, row, begin, end, x0)
+            n_u += n_r
+            x_u += x_r
+            y_u += j * n_r
+            h_u += h_r
+            xh_u += xh_r
+            yh_u += j * h_r
+        begin, end = left, right
+        if abs(sin) <= 1e-12:
+            end = right if dy * cos > 0.0 else left
+        else:
+            cut = min(max(_first_cell(cx + min(max(dy * slope_v, lo), hi)), left), right)
+            begin, end = (cut, right) if right_v else (left, cut)
+        if end > begin:
+            n_r, x_r, _, h_r, xh_r, _ = part_sums(small, large, row, begin, end, x0)
+            n_v += n_r
+            x_v += x_r
+            y_v += j * n_r
+            h_v += h_r
+            xh_v += xh_r
+            yh_v += j * h_r
+    ox, oy = x0 + 0.5 - cx, y0 + 0.5 - cy
+    return (
+        (x_u + ox * n_u) * cos + (y_u + oy * n_u) * sin,
+        0.01 * ((xh_u + ox * h_u) * cos + (yh_u + oy * h_u) * sin),
+        (y_v + oy * n_v) * cos - (x_v + ox * n_v) * sin,
+        0.01 * ((yh_v + oy * h_v) * cos - (xh_v + ox * h_v) * sin),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _scan_hip(small, large, rectangle):  # type: ignore[no-untyped-def]
+    """Return the sums of t, tt and th of a hip roof, t = max(|v|, |u| - ridge), the rectangle given with a >= b."""
+    rows, columns = small.shape[0], small.shape[1] - 1
+    cx, cy = rectangle[0], rectangle[1]
+    cos, sin, tall, slope_u, reach_u, slope_v, reach_v = _lines(rectangle)
+    ridge = 0.5 * (rectangle[2] - rectangle[3])
+    x0 = np.int64(math.floor(cx))
+    ox = x0 + 0.5 - cx
+    cuts = np.empty(6)
+    t, tt, th = 0.0, 0.0, 0.0
+    for row in range(max(_first_cell(cy - tall), 0), min(_first_cell(cy + tall), rows)):
+        dy = row + 0.5 - cy
+        lo = max(dy * slope_u - reach_u, dy * slope_v - reach_v)
+        hi = min(dy * slope_u + reach_u, dy * slope_v + reach_v)
         if not lo < hi:
             continue
         left, right = min(max(_first_cell(cx + lo), 0), columns), min(max(_first_cell(cx + hi), 0), columns)
@@ -194,16 +246,26 @@ def _scan_hip(small, large, rectangle, moments):  # type: ignore[no-untyped-def]
             if end > begin:
                 dx = 0.5 * (begin + end) - cx
                 u, v = dx * cos + dy * sin, dy * cos - dx * sin
-                face = (1 if v >= 0.0 else 0) if abs(u) - ridge <= abs(v) else (3 if u >= 0.0 else 2)
-                _add(small, large, row, begin, end, sums, face)
+                n, x, xx, h, xh, _ = part_sums(small, large, row, begin, end, x0)
+                # In this part of the row t = east dx + rest.
+                if abs(u) - ridge <= abs(v):
+                    sign = 1.0 if v >= 0.0 else -1.0
+                    east, rest = -sign * sin, sign * dy * cos
+                else:
+                    sign = 1.0 if u >= 0.0 else -1.0
+                    east, rest = sign * cos, sign * dy * sin - ridge
+                rest += east * ox
+                t += east * x + rest * n
+                tt += east * east * xx + 2.0 * east * rest * x + rest * rest * n
+                th += 0.01 * (east * xh + rest * h)
                 begin = end
-    _centre(sums, cx, cy, cos, sin, moments)
+    return t, tt, th
 
 
 @njit(cache=True, nogil=True)
 def log_likelihood(n, residual, least_tau):  # type: ignore[no-untyped-def]
-    """Gaussian log-likelihood of n heights whose squared residuals sum up to `residual`, tau profiled."""
-    variance = max(residual / n, least_tau * least_tau)
+    """Gaussian log-likelihood of n heights whose squared residuals sum up to `residual`, tau profiled; 0 of none."""
+    variance = max(residual / max(n, 1.0), least_tau * least_tau)
     return -0.5 * n * math.log(2.0 * math.pi * variance) - 0.5 * residual / variance
 
 
@@ -220,17 +282,73 @@ def _ridge_residual(n, t, tt, h, th, level):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _plane_residual(total, level):  # type: ignore[no-untyped-def]
-    """Residual of the best plane, from the sums of all four quadrants."""
-    n = total[0]
-    uu, uv = total[3] - total[1] * total[1] / n, total[4] - total[1] * total[2] / n
-    vv = total[5] - total[2] * total[2] / n
-    uh, vh = total[7] - total[1] * total[6] / n, total[8] - total[2] * total[6] / n
+def _plane_residual(n, u, v, uu, uv, vv, h, uh, vh, level):  # type: ignore[no-untyped-def]
+    """Residual of the best plane."""
+    uu, uv, vv = uu - u * u / n, uv - u * v / n, vv - v * v / n
+    uh, vh = uh - u * h / n, vh - v * h / n
     determinant = uu * vv - uv * uv
     if determinant <= 1e-9 * (uu * vv + 1.0):
         return level
     explained = (uh * uh * vv - 2.0 * uh * vh * uv + vh * vh * uu) / determinant
     return max(level - explained, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def choose_roof(small, large, rectangle, moments, roof_price, least_tau, least_height, cell, needed):  # type: ignore[no-untyped-def]
+    """Choose the roof of a rectangle from its moments.
+
+    Parameters
+    ----------
+    small, large : tables
+    rectangle : ndarray, shape (5,)
+    moments : tuple of float
+        As `scan` returns them.
+    roof_price, least_tau, least_height, cell : float
+        See `fit_roof`.
+    needed : float
+        Roofs that cannot be likelier than this are not tried: the likelihood is right if it is more than this, else
+        it is some number that is not.
+
+    Returns
+    -------
+    likelihood, residual, kind, slope
+    """
+    _, _, n, u, v, uu, uv, vv, h, uh, vh, hh = moments
+    if n < 1.0:
+        return 0.0, 0.0, FLAT, 0.0
+    mean = h / n
+    level = max(hh - h * mean, 0.0)
+    if mean < least_height:
+        level += n * (least_height - mean) ** 2
+    residual, kind, slope = level, FLAT, 0.0
+    best = log_likelihood(n, level, least_tau)
+    if mean < least_height or n < 8.0 or roof_price == np.inf:
+        return best, residual, kind, slope
+    at_best = log_likelihood(n, 0.0, least_tau) - roof_price
+    if at_best <= max(best, needed):
+        return best, residual, kind, slope
+    trial = _plane_residual(n, u, v, uu, uv, vv, h, uh, vh, level)
+    value = log_likelihood(n, trial, least_tau) - 2.0 * roof_price
+    if value > best:
+        best, residual, kind = value, trial, PLANE
+    if at_best <= best:
+        return best, residual, kind, slope
+    u_half, uh_half, v_half, vh_half = scan_halves(small, large, rectangle)
+    along_u, slope_u = _ridge_residual(n, 2.0 * v_half - v, vv, h, 2.0 * vh_half - vh, level)
+    value = log_likelihood(n, along_u, least_tau) - roof_price
+    if value > best:
+        best, residual, kind, slope = value, along_u, GABLE_U, slope_u / cell
+    along_v, slope_v = _ridge_residual(n, 2.0 * u_half - u, uu, h, 2.0 * uh_half - uh, level)
+    value = log_likelihood(n, along_v, least_tau) - roof_price
+    if value > best:
+        best, residual, kind, slope = value, along_v, GABLE_V, slope_v / cell
+    steep = (slope_u if rectangle[2] >= rectangle[3] else slope_v) / cell
+    if kind >= GABLE_U and steep > _STEEP and residual > n * least_tau * least_tau:
+        trial, slope_h = _hip_residual(small, large, rectangle, n, h, level)
+        value = log_likelihood(n, trial, least_tau) - roof_price
+        if value > best:
+            best, residual, kind, slope = value, trial, HIP, slope_h / cell
+    return best, residual, kind, slope
 
 
 @njit(cache=True, nogil=True)
@@ -259,66 +377,20 @@ def fit_roof(small, large, rectangle, roof_price, least_tau, least_height, cell,
     outside : float
         How many of its cells are not on the grid.
     """
-    q = np.empty((4, 10))
-    score, outside = scan(small, large, rectangle, q)
-    total = np.empty(10)
-    for k in range(10):
-        total[k] = q[0, k] + q[1, k] + q[2, k] + q[3, k]
-    n = total[0]
-    fit[:] = 0.0
-    fit[2] = least_tau
-    if n < 1.0:
-        return 0.0, score, outside
-    mean = total[6] / n
-    level = max(total[9] - total[6] * mean, 0.0)
-    if mean < least_height:
-        level += n * (least_height - mean) ** 2
-    residual, kind, slope = level, FLAT, 0.0
-    best = log_likelihood(n, level, least_tau)
-    if mean >= least_height and n >= 8.0 and roof_price < np.inf:
-        trial = _plane_residual(total, level)
-        value = log_likelihood(n, trial, least_tau) - 2.0 * roof_price
-        if value > best:
-            best, residual, kind = value, trial, PLANE
-        along_u, slope_u = _ridge_residual(
-            n, q[2, 2] + q[3, 2] - q[0, 2] - q[1, 2], total[5], total[6], q[2, 8] + q[3, 8] - q[0, 8] - q[1, 8], level
-        )
-        value = log_likelihood(n, along_u, least_tau) - roof_price
-        if value > best:
-            best, residual, kind, slope = value, along_u, GABLE_U, slope_u / cell
-        along_v, slope_v = _ridge_residual(
-            n, q[1, 1] + q[3, 1] - q[0, 1] - q[2, 1], total[3], total[6], q[1, 7] + q[3, 7] - q[0, 7] - q[2, 7], level
-        )
-        value = log_likelihood(n, along_v, least_tau) - roof_price
-        if value > best:
-            best, residual, kind, slope = value, along_v, GABLE_V, slope_v / cell
-        steep = (slope_u if rectangle[2] >= rectangle[3] else slope_v) / cell
-        if kind >= GABLE_U and steep > _STEEP and residual > n * least_tau * least_tau:
-            trial, slope_h = _hip_residual(small, large, rectangle, q, n, total[6], level)
-            value = log_likelihood(n, trial, least_tau) - roof_price
-            if value > best:
-                best, residual, kind, slope = value, trial, HIP, slope_h / cell
-    fit[0], fit[1], fit[2], fit[3], fit[4] = n, mean, max(math.sqrt(residual / n), least_tau), kind, slope
-    return best, score, outside
+    moments = scan(small, large, rectangle)
+    best, residual, kind, slope = choose_roof(
+        small, large, rectangle, moments, roof_price, least_tau, least_height, cell, -np.inf
+    )
+    n = max(moments[2], 1.0)
+    fit[0], fit[1], fit[2] = moments[2], moments[8] / n, max(math.sqrt(residual / n), least_tau)
+    fit[3], fit[4] = kind, slope
+    return best, moments[0], moments[1]
 
 
 @njit(cache=True, nogil=True)
-def _hip_residual(small, large, rectangle, q, n, h, level):  # type: ignore[no-untyped-def]
+def _hip_residual(small, large, rectangle, n, h, level):  # type: ignore[no-untyped-def]
     longer = rectangle.copy()
     if longer[2] < longer[3]:
         longer[2], longer[3], longer[4] = rectangle[3], rectangle[2], rectangle[4] + 0.5 * math.pi
-    ridge = 0.5 * (longer[2] - longer[3])
-    _scan_hip(small, large, longer, q)
-    t, tt, th = 0.0, 0.0, 0.0
-    for face in range(4):
-        m = q[face]
-        sign = 1.0 if face % 2 == 1 else -1.0
-        if face < 2:
-            t += sign * m[2]
-            tt += m[5]
-            th += sign * m[8]
-        else:
-            t += sign * m[1] - ridge * m[0]
-            tt += m[3] - 2.0 * sign * ridge * m[1] + ridge * ridge * m[0]
-            th += sign * m[7] - ridge * m[6]
+    t, tt, th = _scan_hip(small, large, longer)
     return _ridge_residual(n, t, tt, h, th, level)

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from .births import birth_density, propose_birth
-from .energy import configuration_energy, overlaps, own_energy
+from .energy import configuration_energy, energy_below, least_energy, overlaps, own_energy
 from .moves import (
     GAP,
     OFFSET,
@@ -77,8 +77,8 @@ def _pick_neighbour(rectangles, count, i, reach, number):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True)
-def _accepted(log_ratio, state):  # type: ignore[no-untyped-def]
-    return log_ratio >= 0.0 or uniform(state) < math.exp(log_ratio)
+def _common(rectangles, count, fixed, rectangle, skip, other):  # type: ignore[no-untyped-def]
+    return overlaps(rectangles, count, rectangle, skip, other) + overlaps(fixed, len(fixed), rectangle, -1, -1)
 
 
 @njit(cache=True, nogil=True)
@@ -138,44 +138,44 @@ def run_chain(  # type: ignore[no-untyped-def]
     best, best_energy = rectangles[:count].copy(), energy
     rows = (proposals + stride - 1) // stride
     trace = np.zeros((rows, TRACE_COLUMNS))
-    new, other, auxiliary = np.empty(5), np.empty(5), np.empty(5)
+    new, other, parent, auxiliary, pair = np.empty(5), np.empty(5), np.empty(5), np.empty(5), np.empty((1, 5))
     log_jump = math.log(0.5 * jump_share) if jump_share > 0.0 else 0.0
     cooling = math.log(cold / hot) / max(proposals - 1, 1)
     for t in range(proposals):
         temperature = hot * math.exp(cooling * t)
         row = t // stride
         draw = uniform(state)
+        # A move is accepted when its log ratio C - delta / T exceeds the logarithm of a uniform number, that is, when
+        # delta < limit + T C. The number is drawn first, so that energies above it need not be known.
+        limit = -temperature * math.log(1.0 - uniform(state))
         accepted = False
         if draw < jump_share:
             if draw < 0.5 * jump_share:
                 kind = _BIRTH
                 propose_birth(births, state, new)
                 if _inside(new, births) and count < capacity:
-                    alone = own_energy(small, large, new, model)
-                    shared = overlaps(rectangles, count, new, -1, -1) + overlaps(fixed, len(fixed), new, -1, -1)
-                    delta = alone + model.overlap * shared
                     q = birth_density(births, new)
-                    ratio = birth_log_ratio(delta, temperature, density, count, q, log_jump, log_jump)
-                    if _accepted(ratio, state):
+                    limit += temperature * birth_log_ratio(0.0, temperature, density, count, q, log_jump, log_jump)
+                    shared = model.overlap * _common(rectangles, count, fixed, new, -1, -1)
+                    alone = energy_below(small, large, new, model, limit - shared)
+                    if alone + shared < limit:
                         rectangles[count] = new
                         own[count] = alone
                         count += 1
-                        energy += delta
+                        energy += alone + shared
                         accepted = True
             else:
                 kind = _DEATH
                 if count > 0:
                     i = integer(state, count)
-                    shared = overlaps(rectangles, count, rectangles[i], i, -1)
-                    shared += overlaps(fixed, len(fixed), rectangles[i], -1, -1)
-                    delta = own[i] + model.overlap * shared
                     q = birth_density(births, rectangles[i])
-                    ratio = -birth_log_ratio(delta, temperature, density, count - 1, q, log_jump, log_jump)
-                    if _accepted(ratio, state):
+                    limit -= temperature * birth_log_ratio(0.0, temperature, density, count - 1, q, log_jump, log_jump)
+                    delta = -own[i] - model.overlap * _common(rectangles, count, fixed, rectangles[i], i, -1)
+                    if delta < limit:
                         count -= 1
                         rectangles[i] = rectangles[count]
                         own[i] = own[count]
-                        energy -= delta
+                        energy += delta
                         accepted = True
         elif draw < jump_share + split_share:
             axis = integer(state, 2)
@@ -188,32 +188,30 @@ def run_chain(  # type: ignore[no-untyped-def]
                     g, p = GAP * (2.0 * uniform(state) - 1.0), OFFSET * (2.0 * uniform(state) - 1.0)
                     q, phi = OFFSET * (2.0 * uniform(state) - 1.0), SKEW * (2.0 * uniform(state) - 1.0)
                     split_rectangle(rectangles[i], axis, m, g, p, q, phi, new, other)
-                    if _inside(new, births) and _inside(other, births):
-                        first = own_energy(small, large, new, model)
-                        second = own_energy(small, large, other, model)
-                        shared = overlaps(rectangles, count, new, i, -1) + overlaps(fixed, len(fixed), new, -1, -1)
-                        shared += overlaps(rectangles, count, other, i, -1)
-                        shared += overlaps(fixed, len(fixed), other, -1, -1)
-                        single = np.empty((1, 5))
-                        single[0] = new
-                        shared += overlaps(single, 1, other, -1, -1)
-                        shared -= overlaps(rectangles, count, rectangles[i], i, -1)
-                        shared -= overlaps(fixed, len(fixed), rectangles[i], -1, -1)
-                        delta = first + second - own[i] + model.overlap * shared
-                        parent, parent_own = rectangles[i].copy(), own[i]
-                        rectangles[i], own[i] = new, first
-                        rectangles[count], own[count] = other, second
+                    apart = math.hypot(new[0] - other[0], new[1] - other[1])
+                    if _inside(new, births) and _inside(other, births) and apart < reach:
+                        parent[:] = rectangles[i]
+                        rectangles[i], rectangles[count] = new, other
                         near_first = _neighbours(rectangles, count + 1, i, reach)
                         near_second = _neighbours(rectangles, count + 1, count, reach)
-                        apart = math.hypot(new[0] - other[0], new[1] - other[1])
-                        if apart < reach:
-                            ratio = split_log_ratio(delta, temperature, density, count, side, near_first, near_second)
-                            accepted = _accepted(ratio, state)
-                        if accepted:
+                        rectangles[i] = parent
+                        ratio = split_log_ratio(0.0, temperature, density, count, side, near_first, near_second)
+                        limit += temperature * ratio
+                        pair[0] = new
+                        shared = overlaps(pair, 1, other, -1, -1)
+                        shared += _common(rectangles, count, fixed, new, i, -1)
+                        shared += _common(rectangles, count, fixed, other, i, -1)
+                        shared -= _common(rectangles, count, fixed, parent, i, -1)
+                        rest = model.overlap * shared - own[i]
+                        least = least_energy(small, large, other, model)
+                        first = energy_below(small, large, new, model, limit - rest - least)
+                        second = energy_below(small, large, other, model, limit - rest - first)
+                        if first + second + rest < limit:
+                            rectangles[i], own[i] = new, first
+                            rectangles[count], own[count] = other, second
                             count += 1
-                            energy += delta
-                        else:
-                            rectangles[i], own[i] = parent, parent_own
+                            energy += first + second + rest
+                            accepted = True
             else:
                 kind = _MERGE
                 if count > 1:
@@ -224,23 +222,19 @@ def run_chain(  # type: ignore[no-untyped-def]
                         found = merge_rectangles(rectangles[i], rectangles[j], axis, new, auxiliary)
                         if found and _inside(new, births):
                             near_second = _neighbours(rectangles, count, j, reach)
-                            alone = own_energy(small, large, new, model)
-                            shared = overlaps(rectangles, count, rectangles[i], i, -1)
-                            shared += overlaps(rectangles, count, rectangles[j], i, j)
-                            shared += overlaps(fixed, len(fixed), rectangles[i], -1, -1)
-                            shared += overlaps(fixed, len(fixed), rectangles[j], -1, -1)
-                            shared -= overlaps(rectangles, count, new, i, j)
-                            shared -= overlaps(fixed, len(fixed), new, -1, -1)
-                            delta = own[i] + own[j] - alone + model.overlap * shared
                             side = new[2 + axis]
-                            ratio = -split_log_ratio(
-                                delta, temperature, density, count - 1, side, near_first, near_second
-                            )
-                            if _accepted(ratio, state):
+                            ratio = split_log_ratio(0.0, temperature, density, count - 1, side, near_first, near_second)
+                            limit -= temperature * ratio
+                            shared = _common(rectangles, count, fixed, new, i, j)
+                            shared -= _common(rectangles, count, fixed, rectangles[i], i, -1)
+                            shared -= _common(rectangles, count, fixed, rectangles[j], i, j)
+                            rest = model.overlap * shared - own[i] - own[j]
+                            alone = energy_below(small, large, new, model, limit - rest)
+                            if alone + rest < limit:
                                 rectangles[i], own[i] = new, alone
                                 count -= 1
                                 rectangles[j], own[j] = rectangles[count], own[count]
-                                energy -= delta
+                                energy += alone + rest
                                 accepted = True
         else:
             kind = _SHIFT
@@ -255,16 +249,14 @@ def run_chain(  # type: ignore[no-untyped-def]
                 i = integer(state, count)
                 propose_change(kind, rectangles[i], new, state)
                 if _inside(new, births):
-                    alone = own_energy(small, large, new, model)
-                    delta = alone - own[i]
-                    shared = overlaps(rectangles, count, new, i, -1) - overlaps(rectangles, count, rectangles[i], i, -1)
-                    if len(fixed) > 0:
-                        shared += overlaps(fixed, len(fixed), new, -1, -1)
-                        shared -= overlaps(fixed, len(fixed), rectangles[i], -1, -1)
-                    delta += model.overlap * shared
-                    if _accepted(-delta / temperature, state):
+                    rest = -own[i] - model.overlap * _common(rectangles, count, fixed, rectangles[i], i, -1)
+                    alone = energy_below(small, large, new, model, limit - rest)
+                    # Overlap is never negative, so what the data refuse need not be compared with the neighbours.
+                    if alone + rest < limit:
+                        rest += model.overlap * _common(rectangles, count, fixed, new, i, -1)
+                    if alone + rest < limit:
                         rectangles[i], own[i] = new, alone
-                        energy += delta
+                        energy += alone + rest
                         accepted = True
         trace[row, 4 + kind] += 1
         if accepted:

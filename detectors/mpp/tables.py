@@ -2,16 +2,19 @@
 
 Nouns
 -----
-small table
-    int32, shape (rows, columns + 1, 4): running sums from the west of n (1 for a high cell), n x, n h and the score.
-large table
-    int64, shape (rows, columns + 1, 3): running sums of n x2, n x h and n h2.
+record
+    32 bytes for each cell and one more a row, seen as eight int32 (the *small* table) and as four int64 (the *large*
+    table). Small columns 0 to 5: running sums from the west of n (1 for a high cell), x, h, the score, x2 and x h;
+    large column 3: that of h2.
 x, h, score
-    Column index; height in centimetres; what a cell adds to a rectangle that covers it besides the fit of its roof,
-    in thousandths of a nat.
+    Column index; height in centimetres, at most `TALLEST`; what a cell adds to a rectangle that covers it besides the
+    fit of its roof, in thousandths of a nat.
 
 Whole numbers make sums exact: a rectangle has the same statistics by differences of prefixes as cell by cell, and
-wherever the grid begins. 16 + 24 = 40 bytes a cell.
+wherever the grid begins. The int32 sums run over 2^32 and begin again. That does no harm: differences are taken modulo
+2^32 too, x is counted from a column x0 in the rectangle (sum (x - x0) h = sum x h - x0 sum h, which holds modulo 2^32),
+and the true value fits 32 bits as long as no rectangle reaches over more than `LONGEST` cells:
+|sum (x - x0) h| < 65536 LONGEST^2 / 8 = 2^31.
 """
 
 from __future__ import annotations
@@ -22,10 +25,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["MILLI", "Tables", "make_tables"]
+__all__ = ["LONGEST", "MILLI", "TALLEST", "Tables", "make_tables", "part_sums"]
 
 #: Steps of the score per nat.
 MILLI = 1000.0
+#: Cells that a rectangle may reach over, and the greatest height in centimetres.
+LONGEST, TALLEST = 512, 65535
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,28 +58,47 @@ def make_tables(height: NDArray[np.int32], high: NDArray[np.bool_], score: NDArr
         Nats.
     """
     rows, columns = height.shape
-    small = np.zeros((rows, columns + 1, 4), dtype=np.int32)
-    large = np.zeros((rows, columns + 1, 3), dtype=np.int64)
+    large = np.zeros((rows, columns + 1, 4), dtype=np.int64)
+    small = large.view(np.int32)
     _sum_rows(height, high, score, small, large)
     return Tables(small, large)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def part_sums(small, large, row, first, last, x0):  # type: ignore[no-untyped-def]
+    """Return n, sums of x, xx, h, xh, hh of the cells first..last of a row, x counted from column x0."""
+    n = np.int64(small[row, last, 0]) - small[row, first, 0]
+    x = np.int64(small[row, last, 1]) - small[row, first, 1]
+    h = np.int64(small[row, last, 2]) - small[row, first, 2]
+    xx = np.int64(small[row, last, 4]) - small[row, first, 4]
+    xh = np.int64(small[row, last, 5]) - small[row, first, 5]
+    hh = large[row, last, 3] - large[row, first, 3]
+    return (
+        n,
+        np.int64(np.int32(x - x0 * n)),
+        np.int64(np.int32(xx - x0 * (2 * x - x0 * n))),
+        np.int64(np.int32(h)),
+        np.int64(np.int32(xh - x0 * h)),
+        hh,
+    )
 
 
 @njit(cache=True, nogil=True)
 def _sum_rows(height, high, score, small, large):  # type: ignore[no-untyped-def]
     rows, columns = height.shape
-    one = np.int64(1)
     for r in range(rows):
-        n, nx, nh, points = 0, 0, 0, 0
-        nxx, nxh, nhh = 0 * one, 0 * one, 0 * one
+        zero = np.int64(0)
+        n, x, h, milli, xx, xh, hh = 0, 0, zero, 0, 0, zero, zero
         for c in range(columns):
             if high[r, c]:
-                h = height[r, c] * one
+                level = np.int64(min(height[r, c], TALLEST))
                 n += 1
-                nx += c
-                nh += h
-                nxx += c * c
-                nxh += c * h
-                nhh += h * h
-            points += round(score[r, c] * MILLI)
-            small[r, c + 1, 0], small[r, c + 1, 1], small[r, c + 1, 2], small[r, c + 1, 3] = n, nx, nh, points
-            large[r, c + 1, 0], large[r, c + 1, 1], large[r, c + 1, 2] = nxx, nxh, nhh
+                x += c
+                h += level
+                xx += c * c
+                xh += c * level
+                hh += level * level
+            milli += round(score[r, c] * MILLI)
+            small[r, c + 1, 0], small[r, c + 1, 1], small[r, c + 1, 2] = n, np.int32(x), np.int32(h)
+            small[r, c + 1, 3], small[r, c + 1, 4], small[r, c + 1, 5] = np.int32(milli), np.int32(xx), np.int32(xh)
+            large[r, c + 1, 3] = hh

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .energy import overlaps, own_energy
+from .energy import energy_below, overlaps, own_energy
 
 __all__ = ["close_walls"]
 
@@ -75,8 +75,8 @@ def _back(small, large, model, rectangles, i, edge, tolerance, new):  # type: ig
         else:
             far = middle
     _moved(rectangles[i], edge, -far, new)
-    before = own_energy(small, large, rectangles[i], model)
-    if own_energy(small, large, new, model) <= before + tolerance:
+    limit = own_energy(small, large, rectangles[i], model) + tolerance
+    if energy_below(small, large, new, model, limit) < limit:
         rectangles[i] = new
 
 
@@ -104,6 +104,6 @@ def _out(small, large, model, rectangles, i, edge, tolerance, new):  # type: ign
         else:
             near = middle
     _moved(rectangles[i], edge, near, new)
-    before = own_energy(small, large, rectangles[i], model)
-    if own_energy(small, large, new, model) <= before + tolerance:
+    limit = own_energy(small, large, rectangles[i], model) + tolerance
+    if energy_below(small, large, new, model, limit) < limit:
         rectangles[i] = new

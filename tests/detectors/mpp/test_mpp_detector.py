@@ -9,6 +9,7 @@ import shapely
 
 from roofbench.detectors.mpp.tiles import tiles_of
 from roofbench.detectors.registry import make_detector
+from roofbench.scenes.errors import ParameterError
 from roofbench.scenes.points import PointCloud
 from roofbench.scenes.raster import Elevation, Grid
 from roofbench.scenes.scene import Scene
@@ -131,6 +132,12 @@ def test_birds_holes_and_broken_points_change_little():
 def test_doubled_points_change_nothing():
     points = cloud(6)
     assert wkb(detect(points)) == wkb(detect(points.take(np.repeat(np.arange(len(points)), 2))))
+
+
+def test_rectangles_of_more_cells_than_the_sums_hold_are_refused_with_what_to_do():
+    with pytest.raises(ParameterError, match="lower it to 72, or raise cell"):
+        detect(cloud(), "mpp[cell=0.2]")
+    assert len(detect(cloud(), "mpp[cell=0.25,largest_side=90]")) >= 3
 
 
 def test_without_births_from_data_the_sampler_still_finds_the_houses():

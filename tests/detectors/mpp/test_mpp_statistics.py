@@ -9,10 +9,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roofbench.detectors.mpp.energy import Model, configuration_energy, own_energy
+from roofbench.detectors.mpp.energy import Model, configuration_energy, energy_below, least_energy, own_energy
 from roofbench.detectors.mpp.rectangles import corners, overlap_area
-from roofbench.detectors.mpp.roofs import FLAT, GABLE_U, GABLE_V, HIP, KINDS, PLANE, fit_roof, scan
-from roofbench.detectors.mpp.tables import MILLI, make_tables
+from roofbench.detectors.mpp.roofs import FLAT, GABLE_U, GABLE_V, HIP, KINDS, PLANE, fit_roof, scan, scan_halves
+from roofbench.detectors.mpp.tables import LONGEST, MILLI, TALLEST, make_tables, part_sums
 
 ROWS, COLUMNS = 40, 50
 NONE = np.empty((0, 5))
@@ -56,23 +56,55 @@ def model(**changes):
     return Model(**{**values, **changes})
 
 
-def test_moments_of_quadrants_are_sums_over_cells():
+def test_moments_are_sums_over_cells():
     height, high, score = field()
     tables = make_tables(height, high, score)
-    moments = np.empty((4, 10))
     for rectangle in random_rectangles(np.random.default_rng(1), 200):
-        total, outside = scan(tables.small, tables.large, rectangle, moments)
+        total, outside, *moments = scan(tables.small, tables.large, rectangle)
         inside = naive.cells_inside(rectangle, ROWS, COLUMNS)
         assert total == pytest.approx(np.round(score[inside] * MILLI).sum() / MILLI)
         bigger = naive.cells_inside(rectangle + np.array([50, 50, 0, 0, 0]), ROWS + 100, COLUMNS + 100)
         assert outside == bigger.sum() - inside.sum()
         u, v = naive.frame(rectangle, ROWS, COLUMNS)
-        for quadrant in range(4):
-            held = inside & high & ((u >= 0) == bool(quadrant & 1)) & ((v >= 0) == bool(quadrant & 2))
-            a, b, h = u[held], v[held], 0.01 * height[held]
-            sums = [held.sum(), a, b, a * a, a * b, b * b, h, a * h, b * h, h * h]
-            expected = [np.sum(values) for values in sums]
-            np.testing.assert_allclose(moments[quadrant], expected, rtol=1e-9, atol=1e-7)
+        held = inside & high
+        a, b, h = u[held], v[held], 0.01 * height[held]
+        sums = [held.sum(), a, b, a * a, a * b, b * b, h, a * h, b * h, h * h]
+        np.testing.assert_allclose(moments, [np.sum(values) for values in sums], rtol=1e-9, atol=1e-7)
+        right, upper = a > 0, b > 0
+        np.testing.assert_allclose(
+            scan_halves(tables.small, tables.large, rectangle),
+            [a[right].sum(), (a * h)[right].sum(), b[upper].sum(), (b * h)[upper].sum()],
+            rtol=1e-9,
+            atol=1e-7,
+        )
+
+
+def test_sums_are_exact_far_from_the_left_border_where_running_sums_pass_32_bits():
+    wide = 12000
+    rng = np.random.default_rng(2)
+    height = rng.integers(0, TALLEST + 1, (3, wide)).astype(np.int32)
+    high = rng.random(height.shape) < 0.7
+    tables = make_tables(height, high, np.full(height.shape, -3, np.float32))
+    for first, last in ((0, LONGEST), (5000, 5000 + LONGEST), (wide - LONGEST, wide)):
+        x0 = (first + last) // 2
+        x, held = np.arange(first, last) - x0, high[1, first:last]
+        h = height[1, first:last].astype(np.int64)
+        expected = [np.sum(values[held]) for values in (held, x, x * x, h, x * h, h * h)]
+        assert list(part_sums(tables.small, tables.large, 1, first, last, np.int64(x0))) == expected
+
+
+def test_an_energy_that_is_not_below_the_limit_is_given_up_and_one_below_is_exact():
+    tables = make_tables(*field(8))
+    rng = np.random.default_rng(9)
+    given_up = 0
+    for rectangle in random_rectangles(rng, 300):
+        exact = own_energy(tables.small, tables.large, rectangle, model())
+        assert least_energy(tables.small, tables.large, rectangle, model()) <= exact
+        limit = exact + rng.normal(0, 50)
+        found = energy_below(tables.small, tables.large, rectangle, model(), limit)
+        assert found == exact if exact < limit else found >= limit - 1e-9 * abs(limit)
+        given_up += found == math.inf
+    assert 0 < given_up < 300
 
 
 @pytest.mark.parametrize("kind", [FLAT, PLANE, GABLE_U, GABLE_V, HIP])
