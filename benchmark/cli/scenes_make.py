@@ -69,8 +69,10 @@ def list_(
         recipe = preset(name)
         image = "none" if recipe.bands == "none" else f"{recipe.bands} {recipe.gsd:g} m"
         extent = f"{recipe.width:g} x {recipe.height:g} m"
-        rows.append((name, extent, str(recipe.buildings), image, f"{recipe.pulse} {recipe.point_spacing:g} m"))
-    typer.echo(tabulate(rows, ("preset", "extent", "buildings", "image", "pulses, spacing"), disable_numparse=True))
+        rows.append(
+            (name, extent, f"{recipe.buildings} {recipe.counted}", image, f"{recipe.pulse} {recipe.point_spacing:g} m")
+        )
+    typer.echo(tabulate(rows, ("preset", "extent", "reference", "image", "pulses, spacing"), disable_numparse=True))
 
 
 def _plain(value: object) -> str:

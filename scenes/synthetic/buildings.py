@@ -1,13 +1,11 @@
-"""Houses, halls and towers on their parcels, put together from rectangles that overlap as the papers' references do.
+"""Buildings on their parcels, put together from rectangles that overlap as the papers' references do.
 
-Parcel coordinates: a along the street, b from the front towards the back, metres, origin in the parcel's centre.
 Every parcel has its own row of random draws, so that a knob changes what it names and nothing else.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,75 +13,19 @@ from numpy.typing import NDArray
 
 from ..errors import ParameterError
 from ..raster import Elevation
+from .entities import count_entities
+from .houses import compose_house
 from .layout import HALLS, TOWERS
 from .palettes import PALETTES, draw_colour
-from .parcels import Sites
+from .parcels import Parcel, Sites
 from .recipe import SceneParameters
 from .roofscape import furnish
 from .solids import Roof, Solid, Texture
-from .streams import stream
+from .streams import Draws, stream
 
-__all__ = ["Draws", "Town", "build"]
+__all__ = ["Town", "build"]
 
 _DRAWS = 96
-#: Least area and height of what the reference holds (Awrangjeb et al. 2010, section 4.3).
-SMALLEST, LOWEST = 10.0, 2.5
-
-
-class Draws:
-    """Uniform random numbers of one parcel, taken one after the other."""
-
-    def __init__(self, row: NDArray[np.float64]) -> None:
-        self._numbers: Iterator[float] = iter(row.tolist())
-
-    def unit(self) -> float:
-        """Return the next number in [0, 1)."""
-        return next(self._numbers)
-
-    def between(self, low: float, high: float) -> float:
-        """Return a number between two bounds."""
-        return low + (high - low) * self.unit()
-
-    def chance(self, share: float) -> bool:
-        """Return whether an event of this probability happens."""
-        return self.unit() < share
-
-    def normal(self) -> float:
-        """Return a nearly normal number: the sum of four uniforms, at most 3.46."""
-        return (self.unit() + self.unit() + self.unit() + self.unit() - 2) * 1.7320508
-
-
-@dataclass(frozen=True)
-class Parcel:
-    """A site's frame.
-
-    Attributes
-    ----------
-    x, y, angle, facing : float
-        As in `parcels.Sites`.
-    width, depth : float
-        Metres.
-    """
-
-    x: float
-    y: float
-    angle: float
-    facing: float
-    width: float
-    depth: float
-
-    def place(self, a: float, b: float, along: float, deep: float, turn: float = 0.0, **more: object) -> Solid:
-        """Return a solid over a rectangle given in parcel coordinates; its ridge runs along the longer side.
-
-        `turn` is an extra rotation of the whole building about the parcel's centre, radians.
-        """
-        b *= self.facing
-        angle = self.angle + turn
-        cosine, sine = math.cos(angle), math.sin(angle)
-        x, y = self.x + cosine * a - sine * b, self.y + sine * a + cosine * b
-        if deep > along:
-            angle, along, deep = angle + math.pi / 2, deep, along
-        return Solid(x, y, angle, along, deep, **more)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -106,7 +48,9 @@ class Town:
 
 
 def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) -> Town:
-    """Build exactly ``recipe.buildings`` buildings, sites in the order of their mark.
+    """Build exactly as many buildings or entities as the recipe says, sites in the order of their mark.
+
+    Where entities are counted, the last building has as many parts as are still to come.
 
     Raises
     ------
@@ -120,23 +64,24 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
     solids: list[Solid] = []
     garages: list[tuple[int, Solid]] = []
     built = np.zeros(len(sites), dtype=bool)
-    number = 0
+    number = counted = 0
     for site in np.argsort(sites.mark, kind="stable"):
-        if number == recipe.buildings:
+        if counted == recipe.buildings:
             break
-        parcel = Parcel(
-            *(float(column[site]) for column in (sites.x, sites.y, sites.angle, sites.facing, sites.width, sites.depth))
-        )
+        parcel = sites.parcel(site)
         draws = Draws(shapes[site])
         zone = int(sites.zone[site])
-        compose = {HALLS: _hall, TOWERS: _tower}.get(zone, _house)
+        compose = {HALLS: _hall, TOWERS: _tower}.get(zone, compose_house)
         groups = compose(parcel, recipe, draws)
         # Without its house a parcel has no garage either.
         if not groups or not all(_inside(part, recipe) for part in groups[0]):
             continue
         groups = [group for group in groups if all(_inside(part, recipe) for part in group)]
         built[site] = True
-        for rank, group in enumerate(groups[: recipe.buildings - number]):
+        for rank, whole in enumerate(groups):
+            group, worth = _within_quota(whole, recipe.buildings - counted, recipe.counted)
+            if not group:
+                break
             _paint(group, rank, zone, recipe, Draws(colours[site][rank * 6 :]), Draws(greens[site][rank * 2 :]))
             floor = float(terrain.sample(group[0].x, group[0].y))
             furniture = furnish(group, zone, Draws(roofs[site][rank * 48 :])) if rank == 0 else []
@@ -146,109 +91,34 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
             if rank:
                 garages.append((int(site), group[0]))
             number += 1
-    if number < recipe.buildings:
+            counted += worth
+    if counted < recipe.buildings:
+        what = "" if recipe.counted == "buildings" else f" ({recipe.counted} of the reference)"
         raise ParameterError(
-            f"buildings must be at most {number} on {recipe.width:g} x {recipe.height:g} m with parcels of "
-            f"{recipe.parcel_width:g} x {recipe.parcel_depth:g} m, not {recipe.buildings}: "
-            "widen the extent, narrow the parcels or ask for fewer buildings"
+            f"buildings{what} must be at most {counted} on {recipe.width:g} x {recipe.height:g} m with parcels of "
+            f"{recipe.parcel_width:g} x {recipe.parcel_depth:g} m and this seed, not {recipe.buildings}: "
+            "widen the extent, narrow the parcels or ask for fewer"
         )
     return Town(tuple(solids), built, tuple(garages))
+
+
+def _within_quota(building: list[Solid], quota: int, counted: str) -> tuple[list[Solid], int]:
+    """Return the parts of a building that a quota leaves room for, from its first one on, and what they count."""
+    if quota == 0:
+        return [], 0
+    if counted == "buildings":
+        return building, 1
+    worth = count_entities(building)
+    while worth > quota:
+        building = building[:-1]
+        worth = count_entities(building)
+    return building, worth
 
 
 def _inside(solid: Solid, recipe: SceneParameters) -> bool:
     corners = solid.corners()
     low, high = corners.min(axis=0), corners.max(axis=0)
     return bool(low.min() > 0.3 and high[0] < recipe.width - 0.3 and high[1] < recipe.height - 0.3)
-
-
-def _pitched(draws: Draws, recipe: SceneParameters) -> tuple[Roof, float]:
-    """Draw a house's roof kind and the tangent of its pitch."""
-    flat, gable, shape = draws.unit(), draws.unit(), draws.normal()
-    if flat < recipe.flat_roofs:
-        return (Roof.FLAT, 0.0) if gable < 0.6 else (Roof.SHED, math.tan(math.radians(4 + 8 * draws.unit())))
-    pitch = math.radians(min(max(recipe.roof_pitch * (1 + 0.12 * shape), 4), 62))
-    return (Roof.GABLE if gable < recipe.gable_roofs else Roof.HIP), math.tan(pitch)
-
-
-def _house(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> list[list[Solid]]:
-    """Compose a house of one to three rectangles, and the outbuildings behind it."""
-    size = recipe.building_size
-    left, right = (max(0.3, recipe.gap / 2 * draws.between(0.6, 1.4)) for _ in range(2))
-    drive = draws.chance(0.55) * draws.between(1.6, 2.8)
-    room = parcel.width - left - right - drive
-    width = min(room, draws.between(9.0, 14.5)) * min(size, room / max(room * 0.8, 1e-9))
-    width = max(min(width, room), 5.0)
-    deep = min(draws.between(9.0, 15.0) * size, parcel.depth - recipe.setback - 6)
-    deep = max(deep, 6.0)
-    slack = max(room - width, 0.0)
-    mirror = 1.0 if draws.chance(0.5) else -1.0
-    a = mirror * (-parcel.width / 2 + left + width / 2 + slack * draws.unit() * 0.5)
-    front = -parcel.depth / 2 + recipe.setback * draws.between(0.8, 1.25)
-    turn = math.radians(recipe.orientation_spread) * draws.normal()
-    kind, pitch = _pitched(draws, recipe)
-    storeys = 2 if draws.chance(recipe.two_storeys) else 1
-    eave = recipe.storey_height * storeys * draws.between(0.94, 1.06)
-    more = {"turn": turn, "eave": eave, "roof": kind, "pitch": pitch}
-    shape, swing, reach = draws.unit(), draws.unit(), draws.between(0.4, 0.75)
-    back = max(0.0, min(parcel.depth / 2 - 5 - (front + deep), 8.0))
-    group: list[Solid] = []
-    if shape < 0.34 or back < 2.5:
-        group.append(parcel.place(a, front + deep / 2, width, deep, **more))
-    else:
-        # The body lies across the parcel; wings start at its middle, so their roofs and rectangles overlap.
-        body = max(min(deep * 0.72, 9.5), 6.0)
-        middle = front + (deep - body) * 0.5 + body / 2
-        group.append(parcel.place(a, middle, width, body, **more))
-        wing = max(width * draws.between(0.38, 0.52), 4.2)
-        length = body / 2 + min(back, deep * reach)
-        aside = (width - wing) / 2
-        step = 0.12 * draws.unit()
-        lower = {**more, "eave": eave - step}
-        sides = (mirror,) if shape < 0.62 else (0.0,) if shape < 0.74 else (-1.0, 1.0)
-        towards = 1.0 if swing < 0.72 or recipe.setback < 5 else -1.0
-        if len(sides) == 2 and wing * 2 > width - 2:
-            wing = max((width - 2.5) / 2, 3.2)
-            aside = (width - wing) / 2
-        for rank, side in enumerate(sides):
-            this = length * (1.0 if rank == 0 or shape > 0.87 else 0.7)
-            if towards < 0:
-                this = min(this, body / 2 + recipe.setback * 0.55)
-            group.append(parcel.place(a + side * aside, middle + towards * this / 2, wing, this, **lower))
-    groups = [group]
-    rear = max(float(_deepest(parcel, part)) for part in group)
-    count = recipe.outbuildings
-    for rank in range(2):
-        wanted, car, corner = draws.chance(count - rank), draws.chance(0.62 if rank == 0 else 0.3), draws.unit()
-        wide = draws.between(3.0, 3.9) if car else draws.between(3.2, 4.4)
-        long = draws.between(5.6, 7.4) if car else draws.between(3.4, 5.2)
-        high, top, rise = draws.between(2.55, 2.95), draws.unit(), draws.between(0.05, 0.35)
-        if not wanted:
-            continue
-        wide, long = wide * max(size, 1.0), max(long * max(size, 1.0), SMALLEST / wide + 0.05)
-        side = -mirror if car or corner < 0.5 else mirror
-        side = -side if rank else side
-        place_b = min(rear + 1.5 + 4 * corner * (not car), parcel.depth / 2 - 0.8 - long) + long / 2
-        if place_b - long / 2 < rear + 0.7:
-            continue
-        roof = Roof.FLAT if top < 0.3 else Roof.SHED if top < 0.5 else Roof.GABLE
-        shed = parcel.place(
-            side * (parcel.width / 2 - 0.5 - wide / 2),
-            place_b,
-            wide,
-            long,
-            eave=high,
-            roof=roof,
-            pitch=0.0 if roof == Roof.FLAT else rise * (0.3 if roof == Roof.SHED else 1.0),
-        )
-        groups.append([shed])
-    return groups
-
-
-def _deepest(parcel: Parcel, part: Solid) -> float:
-    """Return the greatest b of a part's corners."""
-    offset = part.corners() - (parcel.x, parcel.y)
-    b = (-math.sin(parcel.angle) * offset[:, 0] + math.cos(parcel.angle) * offset[:, 1]) * parcel.facing
-    return float(b.max())
 
 
 def _hall(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> list[list[Solid]]:

@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .buildings import Draws, Parcel, Town
+from .buildings import Town
 from .layout import HALLS, HOUSES, Layout
 from .palettes import PALETTES, draw_colour, shaded
-from .parcels import Sites
+from .parcels import Parcel, Sites
 from .recipe import SceneParameters
 from .solids import Body, Roof, Solid, Texture
-from .streams import stream
+from .streams import Draws, stream
 from .vegetation import nearest_rectangle, rectangle_table
 
 __all__ = ["Cover", "Patch", "scatter"]
@@ -68,9 +68,7 @@ def scatter(
     solids: list[Solid] = []
     patches: list[Patch] = []
     for site in range(len(sites)):
-        parcel = Parcel(
-            *(float(column[site]) for column in (sites.x, sites.y, sites.angle, sites.facing, sites.width, sites.depth))
-        )
+        parcel = sites.parcel(site)
         draws = Draws(rows[site])
         zone = int(sites.zone[site])
         if zone == HOUSES:

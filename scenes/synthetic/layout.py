@@ -159,19 +159,35 @@ def _zones(layout: Layout, recipe: SceneParameters, seed: int) -> NDArray[np.uin
     half = layout.pattern[1] / 2, layout.pattern[0] / 2
     x, y = layout.to_world(starts[..., 0] + half[0], starts[..., 1] + half[1])
     x, y = x / recipe.width, y / recipe.height
-    inside = (np.abs(x - 0.5) < 0.55) & (np.abs(y - 0.5) < 0.55)
+    area = _areas(layout, recipe)
     towards = (x * direction[0] + y * direction[1]) / np.hypot(*direction) + 0.12 * noise
+    # A block that the border cuts off shows no hall: take whole ones first.
+    towards += 10.0 * (area < 0.7 * layout.pattern[0] * layout.pattern[1])
     away = np.hypot(x - core[0], y - core[1]) + 0.10 * noise
     zones = np.full(shape, TOWERS if recipe.zone == "towers" else HOUSES, dtype=np.uint8)
-    zones[_lowest(park, inside, recipe.park_share)] = PARK
-    zones[_lowest(towards, inside, recipe.hall_share)] = HALLS
-    zones[_lowest(-away, inside, recipe.open_share)] = FIELDS
+    zones[_lowest(park, area, recipe.park_share)] = PARK
+    zones[_lowest(towards, area, recipe.hall_share)] = HALLS
+    zones[_lowest(-away, area, recipe.open_share)] = FIELDS
     return zones
 
 
-def _lowest(values: NDArray[np.float64], inside: NDArray[np.bool_], share: float) -> NDArray[np.bool_]:
-    """Return which blocks have the lowest values, such that they are a share of those in the extent."""
-    ordered = np.sort(values[inside])
-    count = round(share * len(ordered))
-    chosen: NDArray[np.bool_] = values <= ordered[count - 1] if count else np.zeros(values.shape, dtype=bool)
-    return chosen
+def _areas(layout: Layout, recipe: SceneParameters) -> NDArray[np.float64]:
+    """Return the area of each block inside the extent, m2, as the raster's cells tell it."""
+    grid = layout.u.grid
+    x, y = grid.to_world(np.arange(grid.rows)[:, None] + 0.5, np.arange(grid.columns)[None, :] + 0.5)
+    inside = (x > 0) & (x < recipe.width) & (y > 0) & (y < recipe.height)
+    area = np.zeros(layout.zones.shape)
+    for u, v in zip(layout.u.values[inside].tolist(), layout.v.values[inside].tolist(), strict=True):
+        block, row, _, _ = locate(u, v, layout.pattern, layout.key)
+        area[block - layout.first[0], row - layout.first[1]] += _CELL**2
+    return area
+
+
+def _lowest(values: NDArray[np.float64], area: NDArray[np.float64], share: float) -> NDArray[np.bool_]:
+    """Return the blocks of lowest values, as many as cover a share of the extent most nearly."""
+    order = np.argsort(values, axis=None, kind="stable")
+    covered = np.concatenate([[0.0], np.cumsum(area.ravel()[order])])
+    count = int(np.argmin(np.abs(covered - share * covered[-1])))
+    chosen = np.zeros(values.size, dtype=bool)
+    chosen[order[:count]] = True
+    return chosen.reshape(values.shape)

@@ -1,6 +1,7 @@
 """Parcels: where buildings may stand, which way they look and in which order they are built on.
 
-A *site* is a parcel on which one house, hall or tower may stand; its *front* faces the street.
+A *site* is a parcel on which one house, hall or tower may stand; its *front* faces the street. Parcel coordinates: a
+along the street, b from the front towards the back, metres, origin in the parcel's centre.
 """
 
 from __future__ import annotations
@@ -13,12 +14,41 @@ from numpy.typing import NDArray
 
 from .layout import FIELDS, HALLS, PARK, TOWERS, Layout
 from .recipe import SceneParameters
+from .solids import Solid
 from .streams import stream, uniform
 
-__all__ = ["HALL_WIDTH", "Sites", "plan_sites"]
+__all__ = ["HALL_WIDTH", "Parcel", "Sites", "plan_sites"]
 
 #: Parcel widths that make one industrial parcel.
 HALL_WIDTH = 3.2
+#: Steps of a sequence that fills the unit square evenly: powers of the root of t^3 = t + 1.
+_EVEN = np.array((0.7548776662466927, 0.5698402909980532))
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """The frame of one site; attributes as in `Sites`."""
+
+    x: float
+    y: float
+    angle: float
+    facing: float
+    width: float
+    depth: float
+    even: tuple[float, float]
+
+    def place(self, a: float, b: float, along: float, deep: float, turn: float = 0.0, **more: object) -> Solid:
+        """Return a solid over a rectangle given in parcel coordinates; its ridge runs along the longer side.
+
+        `turn` is an extra rotation of the whole building about the parcel's centre, radians.
+        """
+        b *= self.facing
+        angle = self.angle + turn
+        cosine, sine = math.cos(angle), math.sin(angle)
+        x, y = self.x + cosine * a - sine * b, self.y + sine * a + cosine * b
+        if deep > along:
+            angle, along, deep = angle + math.pi / 2, deep, along
+        return Solid(x, y, angle, along, deep, **more)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -38,6 +68,9 @@ class Sites:
     zone : ndarray of uint8, shape (n,)
     mark : ndarray, shape (n,)
         Order in which sites are built on, ascending.
+    even : ndarray, shape (n, 2)
+        Two numbers in [0, 1), spread evenly over the sites in their order: with them the first houses have the same mix
+        of plans and outbuildings as all, and every seed nearly the same one.
     """
 
     x: NDArray[np.float64]
@@ -48,9 +81,16 @@ class Sites:
     depth: NDArray[np.float64]
     zone: NDArray[np.uint8]
     mark: NDArray[np.float64]
+    even: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.x)
+
+    def parcel(self, site: int) -> Parcel:
+        """Return the frame of one site."""
+        columns = (self.x, self.y, self.angle, self.facing, self.width, self.depth)
+        plan, shed = self.even[site].tolist()
+        return Parcel(*(float(column[site]) for column in columns), (plan, shed))
 
 
 def plan_sites(layout: Layout, recipe: SceneParameters, seed: int) -> Sites:
@@ -63,8 +103,11 @@ def plan_sites(layout: Layout, recipe: SceneParameters, seed: int) -> Sites:
     table = np.array(columns, dtype=np.float64).reshape(-1, 6)
     x, y = layout.to_world(table[:, 0], table[:, 1])
     ahead_x, ahead_y = layout.to_world(table[:, 0] + 1.0, table[:, 1])
-    mark = stream(seed, "sites").random(len(x))
+    rng = stream(seed, "sites")
+    mark = rng.random(len(x))
     inside = (x > 0) & (x < recipe.width) & (y > 0) & (y < recipe.height)
+    mark = mark[inside]
+    rank = np.argsort(np.argsort(mark, kind="stable"), kind="stable")
     return Sites(
         x=x[inside],
         y=y[inside],
@@ -73,7 +116,8 @@ def plan_sites(layout: Layout, recipe: SceneParameters, seed: int) -> Sites:
         width=table[inside, 3],
         depth=table[inside, 4],
         zone=table[inside, 5].astype(np.uint8),
-        mark=mark[inside],
+        mark=mark,
+        even=(rng.random(2) + rank[:, None] * _EVEN) % 1.0,
     )
 
 

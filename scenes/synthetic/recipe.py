@@ -69,6 +69,14 @@ class SceneParameters(Parameterised):
     park_share: float = parameter(0.04, minimum=0, maximum=0.9, doc="share of the blocks without buildings")
 
     buildings: int = parameter(70, minimum=0, maximum=20000, doc="buildings in the reference, outbuildings included")
+    counted: str = parameter(
+        "buildings",
+        choices=("buildings", "rectangles"),
+        doc="what the number of buildings counts: an L-shaped house is one building and two rectangles",
+    )
+    plain_plans: float = parameter(
+        0.34, minimum=0, maximum=1, doc="share of the houses that are one rectangle; others are L, T, U or C"
+    )
     outbuildings: float = parameter(0.5, minimum=0, maximum=2, doc="garages and sheds of 10 m2 and more per house")
     building_size: float = parameter(
         1.0, minimum=0.4, maximum=1.6, doc="factor on the sides of buildings", swept=(0.6, 0.8, 1.0, 1.2)

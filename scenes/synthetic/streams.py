@@ -15,13 +15,14 @@ Only additions, multiplications and comparisons are used, which every processor 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["PARTS", "counter_key", "fractal_field", "fractal_tile", "gauss", "stream", "uniform"]
+__all__ = ["PARTS", "Draws", "counter_key", "fractal_field", "fractal_tile", "gauss", "stream", "uniform"]
 
 #: Numbers of the parts; a part keeps its number for ever, new ones are added at the end.
 PARTS = {
@@ -42,6 +43,29 @@ def _sequence(seed: int, part: str) -> np.random.SeedSequence:
 def stream(seed: int, part: str) -> np.random.Generator:
     """Return the random stream of one part of the scene."""
     return np.random.Generator(np.random.PCG64(_sequence(seed, part)))
+
+
+class Draws:
+    """Random numbers of one parcel, taken one after the other."""
+
+    def __init__(self, row: NDArray[np.float64]) -> None:
+        self._numbers: Iterator[float] = iter(row.tolist())
+
+    def unit(self) -> float:
+        """Return the next number in [0, 1)."""
+        return next(self._numbers)
+
+    def between(self, low: float, high: float) -> float:
+        """Return a number between two bounds."""
+        return low + (high - low) * self.unit()
+
+    def chance(self, share: float) -> bool:
+        """Return whether an event of this probability happens."""
+        return self.unit() < share
+
+    def normal(self) -> float:
+        """Return a nearly normal number: the sum of four uniforms, at most 3.46."""
+        return (self.unit() + self.unit() + self.unit() + self.unit() - 2) * 1.7320508
 
 
 def counter_key(seed: int, part: str) -> np.uint64:

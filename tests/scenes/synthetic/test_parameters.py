@@ -15,7 +15,7 @@ from roofbench.scenes.synthetic import SceneParameters
         ({"pulse": "second"}, r"pulse must be one of first, last, all, not 'second'"),
         ({"tree_densty": 3}, r"no parameter 'tree_densty' \(did you mean 'tree_density'\?\)"),
         ({"point_spacing": 0}, r"point_spacing must be from 0.1 to 5 m, not 0"),
-        ({"parcel_depth": 150}, r"parcel_depth of 150 m does not fit 110 x 110 m: it must be at most 102.5 m here"),
+        ({"parcel_depth": 150}, r"parcel_depth of 150 m does not fit 110 x 110 m: it must be at most 102 m here"),
     ],
 )
 def test_a_bad_parameter_is_named_with_its_range(parameters, message):
@@ -25,6 +25,9 @@ def test_a_bad_parameter_is_named_with_its_range(parameters, message):
 
 def test_too_many_buildings_for_the_extent_are_refused_with_the_number_that_fits():
     with pytest.raises(ParameterError, match=r"buildings must be at most \d+ on 110 x 110 m with parcels of"):
+        _ = rb.make_scene("knox-small", buildings=500, width=110, height=110).reference
+    rectangles = r"buildings \(rectangles of the reference\) must be at most \d+ on 110 x 110 m with parcels of"
+    with pytest.raises(ParameterError, match=rectangles):
         _ = rb.make_scene("fairfield-small", buildings=500).reference
 
 

@@ -7,9 +7,15 @@ import pytest
 
 import roofbench as rb
 from roofbench.scenes.synthetic import preset_names
+from roofbench.scenes.synthetic.buildings import build
+from roofbench.scenes.synthetic.layout import plan_layout
+from roofbench.scenes.synthetic.parcels import plan_sites
 from roofbench.scenes.synthetic.presets import preset
+from roofbench.scenes.synthetic.solids import Body
+from roofbench.scenes.synthetic.terrain import natural_terrain
 
-# Printed: extent (m), buildings, lowest and highest ground (m), bands, GSD (m), pulse, point spacing (m).
+# Printed: extent (m), buildings (Fairfield: reference entities), lowest and highest ground (m), bands, GSD (m), pulse,
+# point spacing (m).
 # Awrangjeb et al. 2010, section 4.3, and 2011, section 3.
 AWRANGJEB = {
     "fairfield": ((588, 417), 370, (1, 23), ("red", "green", "blue"), 0.15, "last", 0.5),
@@ -29,13 +35,18 @@ YU = {
 SMALL = [name for name in preset_names() if name.endswith("-small")]
 
 
+def counted(reference, name):
+    """What a preset's number of buildings counts: rectangles at Fairfield, buildings elsewhere."""
+    return len(reference) if name.startswith("fairfield") else len(set(reference.building_ids.tolist()))
+
+
 @pytest.mark.parametrize("name", AWRANGJEB)
 def test_a_preset_has_the_printed_extent_buildings_relief_and_points(name):
     extent, buildings, relief, bands, _, pulse, spacing = AWRANGJEB[name]
     scene = rb.make_scene(name, seed=1)
     xmin, ymin, xmax, ymax = scene.extent
     assert (xmax - xmin, ymax - ymin) == extent
-    assert len(set(scene.reference.building_ids.tolist())) == buildings
+    assert counted(scene.reference, name) == buildings
     if relief is not None:
         low, high = float(scene.dem.values.min()), float(scene.dem.values.max())
         assert low == pytest.approx(relief[0], abs=1.0)
@@ -65,15 +76,36 @@ def test_the_areas_of_toronto_add_up_to_the_printed_one():
 def test_a_small_version_differs_in_size_alone(name):
     small, full = preset(name).values(), preset(name.removesuffix("-small")).values()
     differing = {key for key in small if small[key] != full[key]}
-    assert differing <= {"width", "height", "buildings", "park_share", "open_share", "undulation"}
+    assert differing <= {"width", "height", "buildings", "hall_share", "park_share", "open_share", "undulation"}
     assert small["width"] * small["height"] <= 220**2
 
 
 @pytest.mark.parametrize("name", SMALL)
 def test_a_small_version_holds_its_buildings_with_every_seed(name):
     for seed in range(12):
-        reference = rb.make_scene(name, seed=seed).reference
-        assert len(set(reference.building_ids.tolist())) == preset(name).buildings
+        assert counted(rb.make_scene(name, seed=seed).reference, name) == preset(name).buildings
+
+
+@pytest.mark.parametrize("name", ["fairfield-1", "fairfield-2", "fairfield-3"])
+def test_the_parts_of_fairfield_are_built_up(name):
+    """Most parcels carry a building, most of them of one rectangle: what the printed density implies."""
+    recipe = preset(name)
+    built = []
+    for seed in range(5):
+        sites = plan_sites(plan_layout(recipe, seed), recipe, seed)
+        town = build(sites, natural_terrain(recipe, seed), recipe, seed)
+        margin = np.hypot(sites.width, sites.depth) / 2
+        whole = (np.minimum(sites.x, sites.y) > margin) & (sites.x < recipe.width - margin)
+        whole &= sites.y < recipe.height - margin
+        built.append(town.built[whole].mean())
+        assert (np.bincount([part.owner for part in town.solids if part.body == Body.BUILDING]) == 1).mean() > 0.6
+    assert np.mean(built) > 0.8
+
+
+def test_every_seed_of_fairfield_has_room_for_its_entities():
+    for name in ("fairfield-1", "fairfield-2", "fairfield-3"):
+        for seed in range(100, 130):
+            assert len(rb.make_scene(name, seed=seed).reference) == preset(name).buildings
 
 
 def test_an_image_has_the_printed_cell_size_and_bands():

@@ -65,11 +65,25 @@ def test_parts_of_one_building_overlap_and_those_of_two_do_not(pair):
         assert shapely.union_all(parts).geom_type == "Polygon", "a building is in one piece"
 
 
-def test_shapes_of_several_rectangles_are_common():
-    reference = rb.make_scene("fairfield-1", seed=1).reference
-    parts = np.bincount(reference.building_codes)
-    assert set(np.unique(parts)) == {1, 2, 3}
+def test_houses_have_one_to_four_rectangles():
+    """I, L and T, U, and C shapes, as the paper of 2010 counts them (section 4.1)."""
+    parts = np.bincount(rb.make_scene("moonee-ponds", seed=1).reference.building_codes)
+    assert set(np.unique(parts)) == {1, 2, 3, 4}
     assert (parts > 1).mean() > 0.25
+    aligned = [np.bincount(rb.make_scene("fairfield", seed=s).reference.building_codes) for s in range(3)]
+    assert set(np.unique(np.concatenate(aligned))) == {1, 2, 3, 4}
+
+
+@pytest.mark.parametrize("buildings", range(5, 12))
+def test_a_number_of_rectangles_is_exact_whatever_shape_comes_last(buildings):
+    """The last building has fewer wings where need be, and is still in one piece."""
+    recipe = {"counted": "rectangles", "plain_plans": 0.1, "bands": "none"}
+    before = rb.make_scene("fairfield-1", seed=1, **recipe, buildings=buildings - 1).reference
+    reference = rb.make_scene("fairfield-1", seed=1, **recipe, buildings=buildings).reference
+    assert len(reference) == buildings
+    assert set(shapely.to_wkt(before.polygons)) < set(shapely.to_wkt(reference.polygons))
+    last = reference.polygons[reference.building_codes == reference.building_codes.max()]
+    assert shapely.union_all(last).geom_type == "Polygon"
 
 
 def test_a_digitising_error_moves_corners_by_as_much():
