@@ -10,6 +10,7 @@ Source: Awrangjeb, Ravanbakhsh & Fraser (2010), sections 4.1 and 4.3.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import shapely
@@ -24,7 +25,9 @@ SMALLEST, LOWEST = 10.0, 2.5
 _WITHIN = 0.9
 
 
-def entities(corners: NDArray[np.float64], heights: NDArray[np.float64], owner: NDArray[np.int64]) -> NDArray[np.bool_]:
+def entities(
+    corners: NDArray[np.float64], heights: NDArray[np.float64], owner: NDArray[np.integer[Any]]
+) -> NDArray[np.bool_]:
     """Return which parts of buildings are entities.
 
     Parameters

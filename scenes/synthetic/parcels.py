@@ -89,8 +89,9 @@ class Sites:
     def parcel(self, site: int) -> Parcel:
         """Return the frame of one site."""
         columns = (self.x, self.y, self.angle, self.facing, self.width, self.depth)
+        x, y, angle, facing, width, depth = (float(column[site]) for column in columns)
         plan, shed = self.even[site].tolist()
-        return Parcel(*(float(column[site]) for column in columns), (plan, shed))
+        return Parcel(x, y, angle, facing, width, depth, (plan, shed))
 
 
 def plan_sites(layout: Layout, recipe: SceneParameters, seed: int) -> Sites:
