@@ -113,12 +113,26 @@ def textures(height, state, openness):  # type: ignore[no-untyped-def]
     return bins
 
 
+@njit(cache=True, nogil=True)
+def _tally(bins, height):  # type: ignore[no-untyped-def]
+    """Return n, sum of heights, of their squares (centimetres) of the cells of each bin, shape (192, 3), int64."""
+    tally = np.zeros((_ROUGH_BINS * _OPEN_BINS, 3), dtype=np.int64)
+    for r in range(bins.shape[0]):
+        for c in range(bins.shape[1]):
+            k = bins[r, c]
+            if k >= 0:
+                h = np.int64(height[r, c])
+                tally[k, 0] += 1
+                tally[k, 1] += h
+                tally[k, 2] += h * h
+    return tally
+
+
 def estimate_background(cells: Cells) -> tuple[Background, NDArray[np.int16]]:
     """Estimate the classes of a scene; also return the bin of each cell's texture (-1: no window holds it)."""
     bins = textures(cells.height, cells.state, cells.openness)
-    held = bins >= 0
-    counts = np.bincount(bins[held], minlength=_ROUGH_BINS * _OPEN_BINS).astype(np.float64)
-    counts = counts.reshape(_ROUGH_BINS, _OPEN_BINS)
+    tally = _tally(bins, cells.height)
+    counts = tally[:, 0].astype(np.float64).reshape(_ROUGH_BINS, _OPEN_BINS)
     rough = _LOG_LOW + (np.arange(_ROUGH_BINS) + 0.5) * (_LOG_HIGH - _LOG_LOW) / _ROUGH_BINS
     size_of_sample = int(counts.sum())
     pseudo = max(200.0, 0.1 * size_of_sample)
@@ -151,13 +165,12 @@ def estimate_background(cells: Cells) -> tuple[Background, NDArray[np.int16]]:
     # A smoother window is never less of a roof: the tail of the narrower class must not turn the ratio round.
     evidence = np.minimum.accumulate(evidence, axis=0)
     evidence = np.minimum.accumulate(evidence, axis=1)
-    weights = belongs.ravel()[bins[held]]
-    heights = 0.01 * cells.height[held]
-    size = weights.sum() + 100.0
-    crown_height = float((weights @ heights + 100.0 * 6.0) / size)
-    crown_spread = float(np.sqrt((weights @ (heights - crown_height) ** 2 + 100.0 * 9.0) / size))
+    size, rise, squares = belongs.ravel() @ (tally * np.array([1.0, 1e-2, 1e-4]))
+    crown_height = (rise + 100.0 * 6.0) / (size + 100.0)
+    scatter = squares - 2.0 * crown_height * rise + crown_height**2 * size
+    crown_spread = math.sqrt((max(scatter, 0.0) + 100.0 * 9.0) / (size + 100.0))
     background = Background(
-        crown_height=crown_height,
+        crown_height=float(crown_height),
         crown_spread=max(crown_spread, 2.0),
         crown_share=share,
         roof_roughness=math.exp(means[0]),

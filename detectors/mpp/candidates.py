@@ -50,8 +50,13 @@ def propose_boxes(
     least_cells : int
         Smaller patches and pieces are left out.
     """
-    found = [_boxes(*label_patches(height, roof, round(100 * step)), least_cells) for step in steps]
-    boxes = np.concatenate(found) if found else np.empty((0, 5))
+    found = [np.empty((0, 5))]
+    finer = np.zeros((1, 1), dtype=np.int32)
+    for step in steps:
+        labels, count = label_patches(height, roof, round(100 * step))
+        found.append(_boxes(labels, count, finer, least_cells))
+        finer = labels
+    boxes = np.concatenate(found)
     return boxes[np.sort(np.unique(np.round(boxes, 3), axis=0, return_index=True)[1])]
 
 
@@ -86,7 +91,8 @@ def label_patches(height, roof, step):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _boxes(labels, count, least_cells):  # type: ignore[no-untyped-def]
+def _boxes(labels, count, finer, least_cells):  # type: ignore[no-untyped-def]
+    """Return the boxes of all patches but those that are also patches of `finer` labels, which had them already."""
     rows, columns = labels.shape
     sizes = np.zeros(count + 2, dtype=np.int64)
     for r in range(rows):
@@ -106,21 +112,44 @@ def _boxes(labels, count, least_cells):  # type: ignore[no-untyped-def]
     n = 0
     for label in range(1, count + 1):
         cells = members[starts[label] : starts[label + 1]]
-        if len(cells) >= least_cells:
+        if len(cells) >= least_cells and not _is_patch(finer, cells):
             n = _take_apart(cells, least_cells, boxes, n)
     return boxes[:n].copy()
 
 
 @njit(cache=True, nogil=True)
+def _is_patch(labels, cells):  # type: ignore[no-untyped-def]
+    """Whether all cells have one label; a finer step only parts patches, so that this label has no other cells."""
+    if len(labels) == 1:
+        return False
+    label = labels[cells[0, 0], cells[0, 1]]
+    others = 0
+    for i in range(len(cells)):
+        others += labels[cells[i, 0], cells[i, 1]] != label
+    return others == 0
+
+
+@njit(cache=True, nogil=True)
+def _row_ends(cells):  # type: ignore[no-untyped-def]
+    """Return the first and last cell of each row: no other lies farthest out in any direction."""
+    ends = np.empty_like(cells)
+    n = 0
+    for i in range(len(cells)):
+        if i == 0 or i == len(cells) - 1 or cells[i - 1, 0] != cells[i, 0] or cells[i + 1, 0] != cells[i, 0]:
+            ends[n] = cells[i]
+            n += 1
+    return ends[:n]
+
+
+@njit(cache=True, nogil=True)
 def _best_angle(cells):  # type: ignore[no-untyped-def]
-    """Angle in a quarter turn at which the bounding rectangle, cells beyond the ends cut off, is smallest."""
+    """Angle in a quarter turn at which the bounding rectangle is smallest."""
     best, best_angle = np.inf, 0.0
-    step = max(1, len(cells) // 1500)
     for k in range(_ANGLES):
         angle = 0.5 * math.pi * k / _ANGLES
         cos, sin = math.cos(angle), math.sin(angle)
         low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
-        for i in range(0, len(cells), step):
+        for i in range(len(cells)):
             u = cells[i, 1] * cos + cells[i, 0] * sin
             v = cells[i, 0] * cos - cells[i, 1] * sin
             low_u, high_u = min(low_u, u), max(high_u, u)
@@ -134,7 +163,7 @@ def _best_angle(cells):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def _take_apart(cells, least_cells, boxes, n):  # type: ignore[no-untyped-def]
     """Append the bounding and the largest filled rectangles of a patch, until what is left is small."""
-    angle = _best_angle(cells)
+    angle = _best_angle(_row_ends(cells))
     cos, sin = math.cos(angle), math.sin(angle)
     low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
     for i in range(len(cells)):

@@ -37,6 +37,7 @@ VOID, LOW, HIGH = np.uint8(0), np.uint8(1), np.uint8(2)
 
 #: Points higher above ground than this many metres are birds and clouds (the tallest building of 2025 has 828 m).
 _SKY = 900.0
+_ASTRAY = -(1 << 30)
 #: Points this many centimetres below the highest of a cell still belong to its top.
 _NEAR_TOP = 75
 #: A height that differs by more than this many centimetres from all its neighbours is a spike.
@@ -115,104 +116,107 @@ def make_cells(
     workers, bands
         Threads and the number of row bands the work is split into; neither changes the result.
     """
-    total = np.zeros(grid.shape, dtype=np.int32)
-    high = np.zeros(grid.shape, dtype=np.int32)
-    many = np.zeros(grid.shape, dtype=np.int32)
-    top = np.zeros(grid.shape, dtype=np.int32)
-    near = np.zeros(grid.shape, dtype=np.int32)
-    rise = np.zeros(grid.shape, dtype=np.int32)
+    size = grid.rows * grid.columns
+    counts, tops = np.zeros((size, 4), dtype=np.int32), np.zeros((size, 2), dtype=np.int32)
     returns = points.number_of_returns
     if returns is None:
         returns = np.empty(0, dtype=np.uint8)
     elevation = np.ascontiguousarray(ground.values, dtype=np.float32)
     place = (ground.grid.west, ground.grid.north, ground.grid.gsd)
     frame = (grid.west, grid.north, grid.gsd)
+    cloud = (points.x, points.y, points.z)
     lowest = math.floor(100 * low)
 
     def work(first: int, last: int) -> None:
-        x, y, z = points.x, points.y, points.z
-        heights, index = _above_ground(x, y, z, elevation, place, frame, first, last, *grid.shape)
-        _count(heights, index, returns, lowest, total.ravel(), high.ravel(), many.ravel(), top.ravel())
-        _add_top(heights, index, top.ravel(), near.ravel(), rise.ravel())
+        _count(*cloud, returns, elevation, place, frame, first, last, grid.columns, lowest, counts)
+        _add_tops(*cloud, elevation, place, frame, first, last, grid.columns, counts, tops)
 
     if workers is None or bands == 1:
         work(0, grid.rows)
     else:
         edges = np.linspace(0, grid.rows, bands + 1).astype(int)
         list(workers.map(work, edges[:-1].tolist(), edges[1:].tolist()))
-    height, state, openness = _summarise(total, high, many, near, rise)
+    height, state, openness = _summarise(counts, tops, *grid.shape)
     return Cells(grid, height, state, openness)
 
 
-@njit(cache=True, nogil=True)
-def _above_ground(x, y, z, ground, place, frame, first, last, rows, columns):  # type: ignore[no-untyped-def]
-    """Return height in centimetres and flat cell of each point; cell -1 outside rows first..last and in the sky."""
+@njit(cache=True, nogil=True, inline="always")
+def _cell_of(x, y, frame, first, last, columns):  # type: ignore[no-untyped-def]
+    """Return the flat cell of a place, -1 outside rows first..last and outside the columns."""
     west, north, cell = frame
-    west_g, north_g, cell_g = place
-    rows_g, columns_g = ground.shape
-    heights = np.empty(len(x), dtype=np.int32)
-    index = np.empty(len(x), dtype=np.int32)
-    for i in range(len(x)):
-        index[i] = -1
-        row, column = (north - y[i]) / cell, (x[i] - west) / cell
-        if not (first <= row < last and 0 <= column < columns):
-            continue
-        v = min(max((north_g - y[i]) / cell_g - 0.5, 0.0), rows_g - 1.0)
-        u = min(max((x[i] - west_g) / cell_g - 0.5, 0.0), columns_g - 1.0)
-        r0, c0 = int(v), int(u)
-        r1, c1 = min(r0 + 1, rows_g - 1), min(c0 + 1, columns_g - 1)
-        down, right = v - r0, u - c0
-        upper = ground[r0, c0] + right * (ground[r0, c1] - ground[r0, c0])
-        lower = ground[r1, c0] + right * (ground[r1, c1] - ground[r1, c0])
-        h = z[i] - (upper + down * (lower - upper))
-        if h < _SKY and h > -_SKY:
-            index[i] = int(row) * columns + int(column)
-            heights[i] = math.floor(h * 100.0 + 0.5)
-    return heights, index
+    row, column = (north - y) / cell, (x - west) / cell
+    if not (first <= row < last and 0 <= column < columns):
+        return -1
+    return int(row) * columns + int(column)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _above(x, y, z, ground, place):  # type: ignore[no-untyped-def]
+    """Return the height above ground in centimetres, `_ASTRAY` where there is none or it is in the sky."""
+    west, north, cell = place
+    rows, columns = ground.shape
+    v = min(max((north - y) / cell - 0.5, 0.0), rows - 1.0)
+    u = min(max((x - west) / cell - 0.5, 0.0), columns - 1.0)
+    r0, c0 = int(v), int(u)
+    r1, c1 = min(r0 + 1, rows - 1), min(c0 + 1, columns - 1)
+    down, right = v - r0, u - c0
+    upper = ground[r0, c0] + right * (ground[r0, c1] - ground[r0, c0])
+    lower = ground[r1, c0] + right * (ground[r1, c1] - ground[r1, c0])
+    h = z - (upper + down * (lower - upper))
+    return math.floor(h * 100.0 + 0.5) if -_SKY < h < _SKY else _ASTRAY
 
 
 @njit(cache=True, nogil=True)
-def _count(heights, index, returns, low, total, high, many, top):  # type: ignore[no-untyped-def]
-    """Count all points, high ones and parts of multiple returns per cell, and find the top."""
-    for i in range(len(index)):
-        k = index[i]
+def _count(x, y, z, returns, ground, place, frame, first, last, columns, low, counts):  # type: ignore[no-untyped-def]
+    """Count all points, high ones and parts of multiple returns per cell, and find the top: columns 0 to 3."""
+    for i in range(len(x)):
+        k = _cell_of(x[i], y[i], frame, first, last, columns)
         if k < 0:
             continue
-        total[k] += 1
-        if heights[i] > low:
-            high[k] += 1
-            top[k] = max(top[k], heights[i])
+        height = _above(x[i], y[i], z[i], ground, place)
+        if height == _ASTRAY:
+            continue
+        counts[k, 0] += 1
+        if height > low:
+            counts[k, 1] += 1
+            counts[k, 3] = max(counts[k, 3], height)
         if len(returns) > 0 and returns[i] > 1:
-            many[k] += 1
+            counts[k, 2] += 1
 
 
 @njit(cache=True, nogil=True)
-def _add_top(heights, index, top, near, rise):  # type: ignore[no-untyped-def]
-    """Sum up the points near the top of their cell."""
-    for i in range(len(index)):
-        k = index[i]
-        if k >= 0 and top[k] > 0 and heights[i] >= top[k] - _NEAR_TOP:
-            near[k] += 1
-            rise[k] += heights[i]
+def _add_tops(x, y, z, ground, place, frame, first, last, columns, counts, tops):  # type: ignore[no-untyped-def]
+    """Count and sum up the points near the top of their cell.
+
+    Heights are computed a second time, since keeping them would take more memory than all else in a dense cloud.
+    """
+    for i in range(len(x)):
+        k = _cell_of(x[i], y[i], frame, first, last, columns)
+        if k < 0 or 2 * counts[k, 1] <= counts[k, 0]:
+            continue
+        height = _above(x[i], y[i], z[i], ground, place)
+        if height != _ASTRAY and height >= counts[k, 3] - _NEAR_TOP:
+            tops[k, 0] += 1
+            tops[k, 1] += height
 
 
 @njit(cache=True, nogil=True)
-def _summarise(total, high, many, near, rise):  # type: ignore[no-untyped-def]
-    rows, columns = high.shape
+def _summarise(counts, tops, rows, columns):  # type: ignore[no-untyped-def]
     height = np.zeros((rows, columns), dtype=np.int32)
     state = np.zeros((rows, columns), dtype=np.uint8)
     openness = np.zeros((rows, columns), dtype=np.uint8)
     for r in range(rows):
         for c in range(columns):
-            n = total[r, c]
+            k = r * columns + c
+            n, high, many = counts[k, 0], counts[k, 1], counts[k, 2]
             if n == 0:
                 continue
-            if 2 * high[r, c] <= n:
+            if 2 * high <= n:
                 state[r, c] = LOW
                 continue
             state[r, c] = HIGH
-            height[r, c] = rise[r, c] // near[r, c]
-            openness[r, c] = (255 * max(n - high[r, c], many[r, c])) // n
+            height[r, c] = tops[k, 1] // tops[k, 0]
+            openness[r, c] = (255 * max(n - high, many)) // n
     _despike(height, state, openness)
     for _ in range(2):
         _fill(height, state, openness)

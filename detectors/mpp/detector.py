@@ -133,7 +133,7 @@ class MPP(Detector):
         0.9, minimum=0, maximum=0.99, doc="share of births proposed by the data; 0: uniform", swept=(0, 0.5, 0.9)
     )
     start: str = parameter("greedy", choices=("greedy", "empty"), doc="first state of the chain")
-    effort: float = parameter(1.0, minimum=0, doc="factor of the number of proposals", swept=(0, 0.25, 1, 4))
+    effort: float = parameter(0.25, minimum=0, doc="factor of the number of proposals", swept=(0, 0.25, 1, 4))
     hot: float = parameter(3.0, minimum=1e-3, doc="first temperature", swept=(1, 3, 10, 30))
     cold: float = parameter(0.1, minimum=1e-4, doc="last temperature")
     intensity: float = parameter(

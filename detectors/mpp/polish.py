@@ -104,6 +104,9 @@ def _split(small, large, model, window, rectangles, own, count, fixed, i):  # ty
     """Put the best wall into building i where it lowers the energy; return the gain."""
     parent = rectangles[i].copy()
     best, best_axis, best_at = own[i] - _GAIN, -1, 0.0
+    # Two parts hold the cells of the whole, so no wall gains more than this.
+    if least_energy(small, large, parent, model) + model.price >= best:
+        return 0.0
     first, second = np.empty(5), np.empty(5)
     for axis in range(2):
         side = parent[2 + axis]
