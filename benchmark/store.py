@@ -15,17 +15,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from ..scenes.errors import InputError, OutputError
+from ..scenes.errors import OutputError
+from .database import connect
 from .keys import SourceClosure, canonical
 from .recipes import SceneRecipe
 from .records import RunIdentity, RunRow, StoredScene, evaluation_key
-from .schema import prepare
 from .store_reader import StoreReader
 from .tasks import Outcome, SceneRecord, Score
 
 __all__ = ["RunIdentity", "RunRow", "Store", "StoredScene", "evaluation_key"]
-
-_BUSY_SECONDS = 60
 
 
 class Store(StoreReader):
@@ -41,20 +39,7 @@ class Store(StoreReader):
 
     def __init__(self, path: str | Path, *, must_exist: bool = False) -> None:
         self.path = Path(path)
-        if must_exist and not self.path.is_file():
-            raise InputError(f"{self.path}: no such results store; 'roofbench run' makes one, or name it with --store")
-        if not self.path.parent.is_dir():
-            raise OutputError(f"{self.path} cannot be written: there is no folder {self.path.parent}")
-        try:
-            self._db = sqlite3.connect(self.path, timeout=_BUSY_SECONDS, isolation_level=None)
-            self._db.execute(f"PRAGMA busy_timeout = {_BUSY_SECONDS * 1000}")
-            self._db.row_factory = sqlite3.Row
-            prepare(self._db, self.path)
-            self._db.execute("PRAGMA journal_mode = WAL")
-            self._db.execute("PRAGMA synchronous = NORMAL")
-            self._db.execute("PRAGMA foreign_keys = ON")
-        except sqlite3.OperationalError as error:
-            raise OutputError(f"{self.path} cannot be opened as results store: {error}") from error
+        self._db = connect(self.path, must_exist=must_exist)
 
     def __enter__(self) -> Self:
         return self

@@ -15,6 +15,7 @@ from ..evaluators.base import Evaluation, Evaluator
 from ..scenes.errors import InputError, UnknownNameError
 from ..scenes.footprints import Footprints
 from ..scenes.raster import Grid
+from .database import run_filter
 from .keys import SourceClosure
 from .recipes import PluginRecipe, SceneRecipe
 from .records import RunRow, StoredScene
@@ -86,16 +87,7 @@ class StoreReader:
             Patterns such as ``ndsm*`` for label and scene name.
         limit : int, optional
         """
-        conditions, values = ["1"], list[Any]()
-        for column, wanted, comparison in (
-            ("status", status, "="),
-            ("label", detector, "GLOB"),
-            ("scenes.name", scene, "GLOB"),
-        ):
-            if wanted is not None:
-                conditions.append(f"{column} {comparison} ?")
-                values.append(wanted)
-        where = " AND ".join(conditions)
+        where, values = run_filter(status=status, detector=detector, scene=scene)
         query = f"{_SELECT_RUNS} WHERE {where} ORDER BY runs.id DESC LIMIT ?"
         return self._run_rows(query, (*values, -1 if limit is None else limit))
 

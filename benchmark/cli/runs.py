@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from .options import DEFAULT_STORE, PluginOption, StoreOption, load_plugins, table_console
-
-_COLUMNS = ("id", "key", "status", "label", "scene", "seed", "detected", "seconds", "cpu_seconds", "peak_memory")
 
 
 def ls(
@@ -28,34 +24,11 @@ def ls(
     store: StoreOption = DEFAULT_STORE,
 ) -> None:
     """List stored runs."""
-    from ..store import Store
+    from ..listing import list_runs
 
-    with Store(store, must_exist=True) as opened:
-        rows = opened.runs(status=status, detector=detector, scene=scene, limit=limit or None)
-        total = opened.count_runs() if form == "table" else 0
-    if form == "json":
-        plain = [{name: value for name, value in row._asdict().items() if not name.endswith("_text")} for row in rows]
-        typer.echo(json.dumps(plain, indent=2))
-        return
-    if form == "csv":
-        writer = csv.writer(sys.stdout, lineterminator="\n")
-        writer.writerow([*_COLUMNS, "version", "finished", "reason"])
-        columns = (*_COLUMNS, "version", "finished", "reason")
-        writer.writerows([getattr(row, name) for name in columns] for row in rows)
-        return
-    width = max([len(row.label) for row in rows] + [len("detector")])
-    place = max([len(row.scene) for row in rows] + [len("scene")])
-    lines = [
-        f"{'run':>6}  {'key':8}  {'status':7}  {'detector':{width}}  {'scene':{place}}  {'seed':>4}  {'found':>6}  "
-        f"{'seconds':>8}  {'CPU s':>8}  {'MB':>6}  reason"
-    ]
-    for row in rows:
-        found = "" if row.detected is None else str(row.detected)
-        cost = f"{row.seconds:>8.2f}  {row.cpu_seconds:>8.2f}  {row.peak_memory / 1e6:>6.0f}"
-        line = f"{row.id:>6}  {row.key[:8]}  {row.status:7}  {row.label:{width}}  {row.scene:{place}}  {row.seed:>4}  "
-        lines.append(f"{line}{found:>6}  {cost}  {row.reason}".rstrip())
-    lines.append(f"{len(rows)} of {total} runs in {store}")
-    typer.echo("\n".join(lines))
+    pieces = list_runs(store, status=status, detector=detector, scene=scene, limit=limit or None, form=form)
+    for piece in pieces:
+        typer.echo(piece, nl=False)
 
 
 def why(
