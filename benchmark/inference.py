@@ -48,6 +48,7 @@ def resampling_weights(count: int, resamples: int = _RESAMPLES) -> NDArray[np.in
     return weights
 
 
+@lru_cache(maxsize=256)
 def expanded_level(count: int, level: float = LEVEL) -> float:
     """Return the tail probability at which percentiles of `count` resampled values cover as a t interval does.
 

@@ -38,6 +38,11 @@ class Judge:
         return cls(evaluator, recipe, evaluation_key(recipe, code_digest(evaluator)))
 
     @property
+    def code(self) -> str:
+        """Digest of the source that it depends on."""
+        return code_digest(self.evaluator)
+
+    @property
     def label(self) -> str:
         """Name with changed parameters."""
         return label_of(self.evaluator)

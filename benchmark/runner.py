@@ -16,7 +16,7 @@ from .executors import InProcess, Slot, cluster_slot, local_slots
 from .isolation import Limits, call_isolated
 from .plan import Judge, Overwrite, Plan, PlannedRun, scene_recipe
 from .provenance import code_version
-from .recipes import PluginRecipe, SceneRecipe, code_digest
+from .recipes import PluginRecipe, SceneRecipe
 from .records import RunRow
 from .spool import spool
 from .store import Store
@@ -131,7 +131,7 @@ def score_stored(store: Store, run_id: int, judges: tuple[Judge, ...]) -> int:
     detected = store.detections(run_id)
     for judge in judges:
         evaluation = judge.evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.grid)
-        store.add_score(run_id, Score.of(evaluation, judge.recipe, code_digest(judge.evaluator)))
+        store.add_score(run_id, Score.of(evaluation, judge.recipe, judge.code))
     return len(judges)
 
 
@@ -143,6 +143,7 @@ def _outcomes(
         return
     described = store.described_scenes()
     evaluators = tuple(judge.recipe for judge in plan.judges)
+    codes = tuple(judge.code for judge in plan.judges)
     with ExitStack() as stack:
         slots = stack.enter_context(_slots(execution, len(runs)))
         elsewhere = execution.jobs > 0 or execution.scheduler is not None
@@ -158,6 +159,7 @@ def _outcomes(
                     detector=run.identity.detector,
                     seed=run.identity.seed,
                     evaluators=evaluators,
+                    codes=codes,
                     describe_scene=run.identity.scene_key not in described,
                 )
                 slot = free.pop(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 from ..evaluators.base import Verdicts
 from ..reports.verdict_layers import write_verdicts
@@ -16,22 +17,18 @@ __all__ = ["export_run", "stored_verdicts"]
 
 def stored_verdicts(store: Store, run_id: int, key: str) -> Verdicts | None:
     """Return the verdicts of a run by the evaluator of that key, geometry included; None when it gave none."""
-    import pandas as pd
-
     rows = store.verdicts(run_id, key)
     reference = store.scene(store.run(run_id).scene_id).reference
     if reference is None or not (rows["detection"] or rows["reference"]):
         return None
     sides: dict[str, Footprints] = {"detection": store.detections(run_id), "reference": reference}
-    frames = {}
+    columns: dict[str, dict[str, Any]] = {}
     for side, footprints in sides.items():
-        frame = pd.DataFrame.from_records(rows[side])
-        frame["geometry"] = list(footprints.polygons)
-        for name, column in footprints.attributes.items():
-            if name not in frame:
-                frame[name] = column
-        frames[side] = frame
-    return Verdicts(frames["detection"], frames["reference"])
+        names = dict.fromkeys(name for row in rows[side] for name in row)
+        columns[side] = {name: [row.get(name) for row in rows[side]] for name in names}
+        columns[side]["geometry"] = footprints.polygons
+        columns[side] = {**footprints.attributes, **columns[side]}
+    return Verdicts(columns["detection"], columns["reference"])
 
 
 def export_run(

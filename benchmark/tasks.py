@@ -12,6 +12,7 @@ outcome
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -40,6 +41,8 @@ class Task:
     seed : int
         Of the detector's random stream; 0 when it draws no random numbers.
     evaluators : tuple of PluginRecipe
+    codes : tuple of str
+        Digest of the source that each evaluator depends on, where the caller has read it already.
     describe_scene : bool
         Whether the outcome shall describe the scene and its reference, because the store does not know them yet.
     """
@@ -48,6 +51,7 @@ class Task:
     detector: PluginRecipe
     seed: int
     evaluators: tuple[PluginRecipe, ...]
+    codes: tuple[str, ...] = ()
     describe_scene: bool = False
 
     def to_json(self) -> str:
@@ -58,6 +62,7 @@ class Task:
                 "detector": self.detector.to_dict(),
                 "seed": self.seed,
                 "evaluators": [recipe.to_dict() for recipe in self.evaluators],
+                "codes": list(self.codes),
                 "describe_scene": self.describe_scene,
             }
         )
@@ -71,6 +76,7 @@ class Task:
             detector=PluginRecipe(**values["detector"]),
             seed=values["seed"],
             evaluators=tuple(PluginRecipe(**recipe) for recipe in values["evaluators"]),
+            codes=tuple(values["codes"]),
             describe_scene=values["describe_scene"],
         )
 
@@ -121,9 +127,9 @@ class Score:
         verdicts: dict[str, list[dict[str, Any]]] = {}
         given = evaluation.verdicts
         if given is not None:
-            for side, frame in (("detection", given.detections), ("reference", given.references)):
-                names = [str(name) for name in frame.columns if name != "geometry"]
-                columns = [[_plain(value) for value in frame[name].tolist()] for name in names]
+            for side, table in (("detection", given.detection_columns), ("reference", given.reference_columns)):
+                names = [name for name in table if name != "geometry"]
+                columns = [[_plain(value) for value in _values(table[name])] for name in names]
                 verdicts[side] = [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
         return cls(
             evaluator=recipe,
@@ -136,13 +142,20 @@ class Score:
         )
 
 
+def _values(column: Any) -> list[Any]:
+    """Return the values of a column; those of an array as Python numbers, which are faster to go through."""
+    return column.tolist() if hasattr(column, "tolist") else list(column)
+
+
 def _plain(value: Any) -> Any:
-    """Return a Python number, text or None of what a DataFrame or an evaluation holds; not-a-number becomes None."""
+    """Return a Python number, text or None of what a table or an evaluation holds; not-a-number becomes None."""
     if isinstance(value, np.generic):
         value = value.item()
-    if value is None or type(value).__name__ == "NAType" or value != value:
-        return None
-    return value if isinstance(value, bool | int | float | str) else str(value)
+    if isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return None if math.isnan(value) else value
+    return None if value is None or type(value).__name__ == "NAType" else str(value)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,9 @@ import platform
 import time
 import traceback
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,8 @@ def execute(
         started = time.perf_counter(), time.process_time()
         detected = detect(scene, detector, seed=task.seed)
         cost = _cost_since(started)
-        scores = score(detected, scene, list(zip(task.evaluators, evaluators, strict=True)))
+        codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
+        scores = score(detected, scene, list(zip(task.evaluators, codes, evaluators, strict=True)))
     except MemoryError:
         reason = "out of memory"
         return Outcome(
@@ -112,14 +114,14 @@ def execute(
     )
 
 
-def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecipe, Evaluator]]) -> list[Score]:
+def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecipe, str, Evaluator]]) -> list[Score]:
     """Return what each evaluator says; nothing for a scene without reference."""
     if scene.reference is None:
         return []
     scores = []
-    for recipe, evaluator in evaluators:
+    for recipe, code, evaluator in evaluators:
         evaluation = evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.evaluation_grid)
-        scores.append(Score.of(evaluation, recipe, code_digest(evaluator)))
+        scores.append(Score.of(evaluation, recipe, code))
     return scores
 
 
@@ -186,7 +188,8 @@ def _peak_memory() -> int:
     return 0
 
 
-def machine_facts() -> dict[str, Any]:
+@cache
+def machine_facts() -> Mapping[str, Any]:
     """Return where the work is done: host, processor, cores, system, Python."""
     return {
         "host": platform.node(),

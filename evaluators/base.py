@@ -18,6 +18,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -77,15 +78,38 @@ class Index:
 class Verdicts:
     """Why each object is right or wrong: one row per detection and per reference.
 
+    Columns ``id``, ``verdict``, ``partner``, ``distance``, ``overlap_area``, ``iou``, ``rmse``, ``reason``,
+    ``geometry`` (shapely), further ones as the evaluator needs. They become data frames when somebody asks: a sweep
+    stores the verdicts of thousands of runs without any.
+
     Attributes
     ----------
-    detections, references : DataFrame
-        Columns ``id``, ``verdict``, ``partner``, ``distance``, ``overlap_area``, ``iou``, ``rmse``, ``reason``,
-        ``geometry`` (shapely), further ones as the evaluator needs.
+    detection_columns, reference_columns : mapping of str to array, masked array or list
     """
 
-    detections: pd.DataFrame
-    references: pd.DataFrame
+    detection_columns: Mapping[str, Any]
+    reference_columns: Mapping[str, Any]
+
+    @cached_property
+    def detections(self) -> pd.DataFrame:
+        """One row per detection; whole numbers that are masked are <NA>."""
+        return _frame(self.detection_columns)
+
+    @cached_property
+    def references(self) -> pd.DataFrame:
+        """One row per reference; see `detections`."""
+        return _frame(self.reference_columns)
+
+
+def _frame(columns: Mapping[str, Any]) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(
+        {
+            name: pd.arrays.IntegerArray(column.data, np.ma.getmaskarray(column)) if np.ma.isMA(column) else column
+            for name, column in columns.items()
+        }
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

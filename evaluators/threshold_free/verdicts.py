@@ -7,7 +7,7 @@ when somebody asks, since a city has a million of them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,6 @@ from ...scenes.footprints import Footprints
 from ..base import Verdicts
 from .correspondence import DECIMALS, Correspondence
 from .overlap import Overlaps
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 __all__ = ["ObjectGraph", "verdict_tables"]
 
@@ -104,7 +101,7 @@ def verdict_tables(graph: ObjectGraph) -> Verdicts:
     verdict = np.where(matched, "TP", np.where(of_detection.count > 0, "MD", "FP")).astype(object)
     verdict[~graph.counted_detections] = "left out"
     table_d = _table(graph.detected, verdict, position, pairs.second, graph.reference, graph, rmse)
-    table_d["reason"] = _detection_reasons(graph, verdict, of_detection, claims, table_d["distance"].to_numpy())
+    table_d["reason"] = _detection_reasons(graph, verdict, of_detection, claims, table_d["distance"])
 
     matched = match.of_reference >= 0
     own_pair = np.full(len(graph.reference), -1, dtype=np.int64)
@@ -135,9 +132,7 @@ def _table(
     others: Footprints,
     graph: ObjectGraph,
     rmse: NDArray[np.float64],
-) -> pd.DataFrame:
-    import pandas as pd
-
+) -> dict[str, Any]:
     has = position >= 0
     pair = position[has]
     partner = np.zeros(len(footprints), dtype=np.int64)
@@ -148,14 +143,8 @@ def _table(
     numbers["overlap_area"][has] = shared
     united = footprints.areas[has] + others.areas[other_rows[pair]] - shared
     numbers["iou"][has] = np.minimum(shared / united, 1.0)
-    columns = {
-        "id": footprints.ids,
-        "verdict": verdict,
-        "partner": pd.arrays.IntegerArray(partner, ~has),
-        **numbers,
-        "rmse": rmse,
-    }
-    return pd.DataFrame(columns)
+    partners = np.ma.MaskedArray(partner, mask=~has)
+    return {"id": footprints.ids, "verdict": verdict, "partner": partners, **numbers, "rmse": rmse}
 
 
 def _names(footprints: Footprints, rows: list[int]) -> str:
@@ -250,7 +239,7 @@ def _detection_reasons(
 
 def _reference_reasons(
     graph: ObjectGraph,
-    table: pd.DataFrame,
+    table: dict[str, Any],
     of_detection: _Neighbours,
     of_reference: _Neighbours,
     claims: _Claims,
@@ -259,7 +248,7 @@ def _reference_reasons(
     reference_ids, detection_ids = graph.reference.ids.tolist(), graph.detected.ids.tolist()
     partner, holds = match.of_reference.tolist(), match.of_detection.tolist()
     overlapping, touched = of_reference.count.tolist(), of_detection.count.tolist()
-    covered = (table["overlap_area"].to_numpy() / graph.reference.areas).tolist()
+    covered = (table["overlap_area"] / graph.reference.areas).tolist()
     reasons = []
     for row, (what, moved) in enumerate(zip(table["verdict"].tolist(), table["distance"].tolist(), strict=True)):
         if what == "left out":
