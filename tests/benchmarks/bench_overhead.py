@@ -2,11 +2,12 @@
 
 A sweep of 5 parameters x 5 values x 10 scenes (250 runs) on two workers with a detector that computes for so many
 seconds (0.5). Counted in processor time, so that other work on the machine matters little: everything that this process
-and its workers use beyond the detections. Of that, opening the ten scenes and evaluating 250 results are work that any
-script would do; they are measured apart in this process, and the rest is the framework's.
+and its workers use beyond the detections, and what of it goes where. Opening the ten scenes and evaluating 250 results
+are work that any script would do; they are measured apart in this process.
 """
 
 import resource
+import subprocess
 import sys
 import tempfile
 import time
@@ -16,10 +17,10 @@ import shapely
 
 import roofbench as rb
 from roofbench.benchmark.recipes import SceneRecipe
-from roofbench.benchmark.runner import Execution
+from roofbench.benchmark.runner import Execution, run_plan
 from roofbench.benchmark.store import Store
 from roofbench.benchmark.suite import Entrant, Suite
-from roofbench.benchmark.sweep import axis_of, make_sweep, run_sweep
+from roofbench.benchmark.sweep import axis_of, make_sweep, sweep_table
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 
@@ -72,8 +73,16 @@ def work_of_any_script(scenes, runs):
     return opening, time.process_time() - started
 
 
+def start_of_a_worker():
+    """Return the processor seconds of a fresh Python that imports what a worker needs."""
+    before = cpu_seconds()
+    subprocess.run([sys.executable, "-c", "import roofbench.benchmark.worker"], check=True)
+    return cpu_seconds() - before
+
+
 def main():
     seconds = sys.argv[1] if len(sys.argv) > 1 else "0.5"
+    own = time.process_time
     with tempfile.TemporaryDirectory() as folder:
         plugin = Path(folder) / "busy.py"
         plugin.write_text(DETECTOR)
@@ -81,20 +90,38 @@ def main():
         scenes = tuple(SceneRecipe.of_preset("hamlet", seed=seed) for seed in range(10))
         suite = Suite("overhead", scenes, (Entrant(detector),), (make_evaluator("threshold-free"),))
         with Store(Path(folder) / "a.sqlite") as store:
-            wall, cpu, own = time.perf_counter(), cpu_seconds(), time.process_time()
+            wall, cpu, started = time.perf_counter(), cpu_seconds(), own()
             sweep = make_sweep(suite, [axis_of(f"{name}=1,2,3,4,5") for name in "abcde"], store)
-            _, rows = run_sweep(sweep, store, execution=Execution(jobs=2))
-            wall, cpu, own = time.perf_counter() - wall, cpu_seconds() - cpu, time.process_time() - own
+            planned = own()
+            result = run_plan(sweep.plan, store, execution=Execution(jobs=2))
+            stored = own()
+            sweep_table(sweep, store, {row.key: row for row in result.rows})
+            wall, cpu, ended = time.perf_counter() - wall, cpu_seconds() - cpu, own()
+    rows = result.rows
     detecting = sum(row.cpu_seconds for row in rows)
-    print(f"{len(rows)} runs, {wall:.1f} s wall on 2 workers (ideal {sum(r.seconds for r in rows) / 2:.1f} s)")
-    print(f"detectors      {detecting:8.2f} s CPU")
     opening, evaluating = work_of_any_script(scenes, len(rows))
-    rest = cpu - detecting - opening - evaluating
-    print(f"opening scenes {opening:8.2f} s CPU")
-    print(f"evaluating     {evaluating:8.2f} s CPU, verdicts included")
-    print(f"framework      {rest:8.2f} s CPU = {rest / len(rows) * 1e3:.1f} ms a run, start of the workers included;")
-    print(f"               {own:8.2f} s of it in the main process")
-    print(f"overhead       {rest / detecting * 100:8.1f} % of the detectors' time")
+    table = {
+        "planning: keys of code, scenes and runs": planned - started,
+        "main process: handing out, reading outcomes, storing": stored - planned,
+        "table with intervals (pandas and scipy are imported)": ended - stored,
+        "start of two workers": 2 * start_of_a_worker(),
+    }
+    table["workers: the rest (scene pictures, checks, messages)"] = (
+        cpu - detecting - opening - evaluating - sum(table.values())
+    )
+    framework = sum(table.values())
+    print(f"{len(rows)} runs, {wall:.1f} s wall on 2 workers (ideal {sum(row.seconds for row in rows) / 2:.1f} s)\n")
+    print("| what | s CPU | % of the detectors' time |\n|---|--:|--:|")
+    for name, used in {
+        "detectors": detecting,
+        **table,
+        "**framework**": framework,
+        "opening ten scenes": opening,
+        "evaluating, verdicts included": evaluating,
+        "**framework, scenes and evaluation**": framework + opening + evaluating,
+    }.items():
+        print(f"| {name} | {used:.2f} | {used / detecting * 100:.1f} |")
+    print(f"\nframework: {framework / len(rows) * 1e3:.1f} ms a run")
 
 
 if __name__ == "__main__":
