@@ -22,6 +22,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import IO
 
+from .memory import bound_allocations, highest_memory
 from .tasks import Cost, Outcome
 
 __all__ = ["THREAD_LIMITS", "IsolatedProcess", "Limits", "call_isolated"]
@@ -37,8 +38,7 @@ THREAD_LIMITS = {
 }
 _PACKAGE = __package__
 _START = f"from {_PACKAGE}.isolation import serve; serve()"
-_ALLOCATION_SLACK = 1 << 30  # bytes that libraries may reserve without using them
-_WATCH_EVERY = 0.1  # seconds between looks at a worker's memory
+_WATCH_EVERY = 0.05  # seconds between looks at a worker's time and memory
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ class Limits:
     Attributes
     ----------
     seconds : float, optional
-        Wall clock, reading of the scene and evaluation included.
+        Wall clock, reading of the scene, evaluation, and on the first run of a worker its start included.
     memory : int, optional
-        Resident memory of the worker process, bytes.
+        Highest resident memory of the worker process, bytes.
     """
 
     seconds: float | None = None
@@ -73,7 +73,7 @@ class IsolatedProcess:
         errors.seek(0)
         errors.truncate()
         if limits.memory is not None:
-            _stop_runaway_allocation(process.pid, limits.memory)
+            bound_allocations(process.pid, limits.memory)
         started = time.monotonic()
         peak = 0
         try:
@@ -81,12 +81,14 @@ class IsolatedProcess:
             deadline = None if limits.seconds is None else started + limits.seconds
             receiver = _Receiver(process.stdout)
             while (message := receiver.poll(_WATCH_EVERY)) is None:
-                used = _resident(process.pid) if limits.memory is not None else 0
-                peak = max(peak, used)
+                peak = highest_memory(process.pid)
                 if deadline is not None and time.monotonic() > deadline:
                     return self._failed(process, f"time limit of {limits.seconds:g} s passed", started, peak)
-                if limits.memory is not None and used > limits.memory:
-                    return self._failed(process, f"memory limit of {limits.memory / 1e6:.0f} MB passed", started, peak)
+                if limits.memory is not None and peak > limits.memory:
+                    return self._failed(process, _too_much(peak, limits.memory), started, peak)
+            peak = highest_memory(process.pid)
+            if limits.memory is not None and peak > limits.memory:  # a spike between two looks
+                return self._failed(process, _too_much(peak, limits.memory), started, peak)
             return message
         except (EOFError, OSError, ValueError):  # ValueError: the stream was closed
             return self._failed(process, None, started, peak)
@@ -135,6 +137,10 @@ class IsolatedProcess:
                 start_new_session=True,  # Ctrl-C goes to the caller, who ends its workers in order
             )
         return self._process
+
+
+def _too_much(peak: int, limit: int) -> str:
+    return f"memory limit of {limit / 1e6:.0f} MB passed: {peak / 1e6:.0f} MB used"
 
 
 def _death(code: int | None) -> str:
@@ -230,22 +236,3 @@ class _Receiver:
         if self._size is not None and len(self._data) >= self._size:
             return bytes(self._data)
         return None
-
-
-def _stop_runaway_allocation(process: int, memory: int) -> None:
-    """Let one huge allocation fail at once, before a look at the memory could notice it (Linux only)."""
-    import psutil
-
-    if hasattr(psutil, "RLIMIT_DATA"):
-        bound = memory + _ALLOCATION_SLACK
-        with suppress(psutil.Error, OSError):
-            psutil.Process(process).rlimit(psutil.RLIMIT_DATA, (bound, psutil.RLIM_INFINITY))
-
-
-def _resident(process: int) -> int:
-    """Return the resident memory of a process, bytes."""
-    import psutil
-
-    with suppress(psutil.Error):
-        return int(psutil.Process(process).memory_info().rss)
-    return 0

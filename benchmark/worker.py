@@ -24,6 +24,7 @@ from ..scenes.errors import RoofbenchError
 from ..scenes.footprints import Footprints
 from ..scenes.scene import Scene
 from .keys import random_stream_entropy
+from .memory import highest_memory, reset_highest_memory
 from .recipes import PluginRecipe, SceneRecipe, code_digest
 from .tasks import Cost, Outcome, SceneRecord, Score, Task, _plain
 
@@ -67,6 +68,7 @@ def execute(
         The objects themselves, where task and caller share a process.
     """
     started = time.perf_counter(), time.process_time()
+    reset_highest_memory()  # a limit is about this run, not about those before it
     try:
         scene = scene if scene is not None else _opened(task.scene)
         detector = detector if detector is not None else task.detector.detector()
@@ -78,23 +80,16 @@ def execute(
         if lacking:
             return Outcome(status="skipped", reason=lacking, scene=record, machine=machine_facts())
         _read(visible)
-        _reset_peak_memory()
+        reset_highest_memory()
         started = time.perf_counter(), time.process_time()
         detected = detect(scene, detector, seed=task.seed)
         cost = _cost_since(started)
         codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
         scores = score(detected, scene, list(zip(task.evaluators, codes, evaluators, strict=True)))
-    except MemoryError:
-        reason = "out of memory"
-        return Outcome(
-            status="failed",
-            reason=reason,
-            traceback=traceback.format_exc(),
-            cost=_cost_since(started),
-            machine=machine_facts(),
-        )
     except Exception as error:
         told = str(error) if isinstance(error, RoofbenchError) else f"{type(error).__name__}: {error}"
+        if isinstance(error, MemoryError):
+            told = f"out of memory: {error}".rstrip(": ")
         return Outcome(
             status="failed",
             reason=" ".join(told.split())[:500],
@@ -171,21 +166,8 @@ def _cost_since(started: tuple[float, float]) -> Cost:
     return Cost(
         seconds=time.perf_counter() - started[0],
         cpu_seconds=time.process_time() - started[1],
-        peak_memory=_peak_memory(),
+        peak_memory=highest_memory(),
     )
-
-
-def _reset_peak_memory() -> None:
-    """Let the kernel count the highest resident memory anew (Linux only)."""
-    with suppress(OSError), open("/proc/self/clear_refs", "w") as control:
-        control.write("5")
-
-
-def _peak_memory() -> int:
-    with suppress(OSError, ValueError, StopIteration), open("/proc/self/status") as status:
-        line = next(line for line in status if line.startswith("VmHWM"))
-        return int(line.split()[1]) * 1024
-    return 0
 
 
 @cache

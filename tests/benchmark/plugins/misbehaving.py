@@ -63,6 +63,9 @@ class Misbehaving(rb.Detector):
             hoard.append(np.ones(4_000_000))
             time.sleep(0.01)
 
+    def _spikes(self, scene):
+        np.ones(60_000_000)  # 480 MB for some hundredths of a second
+
     def _swallows(self, scene):
         np.ones(10**13, dtype=np.uint8)
 
