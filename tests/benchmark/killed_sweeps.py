@@ -65,7 +65,7 @@ def kill_and_resume(folder, moments, *, sides, jobs=2, stream=0):
     stored = [0]
     for _ in range(moments):
         process = start_sweep(folder / "killed.sqlite", jobs, sides)
-        target = stored[-1] + draw.randint(0, max(1, total // moments))
+        target = stored[-1] + draw.randint(0, max(1, total // (2 * moments)))
         while count_runs(folder / "killed.sqlite") < target and process.poll() is None:
             time.sleep(0.02)
         time.sleep(draw.uniform(0, 0.4))
