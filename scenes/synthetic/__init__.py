@@ -1,8 +1,8 @@
 """The synthetic scene generator: terrain, streets, buildings, trees, and how laser and camera see them.
 
 From truth to measurement: `recipe` (parameters) and `streams` (random numbers) -> `layout`, `terrain`, `buildings`,
-`vegetation`, `clutter` -> `world` -> `lidar`, `orthoimage` (by way of `surface`, `lighting`),
-`terrain.measured_dem`, `reference`. `make` puts them into a `Scene`, `presets` names recipes.
+`vegetation`, `clutter` -> `world` -> `lidar`, `orthoimage` (by way of `surface`, `lighting`), `survey` (the DEM),
+`reference`. `make` puts them into a `Scene`, `presets` names recipes.
 """
 
 from .make import make_scene

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["GENERATOR", "make_scene", "scene_of"]
 
 #: Version of the generator: raised whenever the same recipe and seed give another scene.
-GENERATOR = 2
+GENERATOR = 3
 #: Lower left corner of every synthetic scene, metres.
 ORIGIN = (320000.0, 5810000.0)
 
@@ -80,7 +80,7 @@ def scene_of(recipe: SceneParameters, *, seed: int, name: str = "synthetic", pre
         return photograph(world(), ORIGIN)
 
     def dem() -> Elevation:
-        from .terrain import measured_dem
+        from .survey import measured_dem
 
         return measured_dem(world(), ORIGIN)
 

@@ -1,12 +1,6 @@
 """The orthoimage: a photograph rectified with the bare-earth DEM, so that everything above the ground leans.
 
-Nouns
------
-camera
-    Projection centre above the extent, so far beside its centre that the view there is off-nadir by `view_angle`.
-relief displacement
-    A point at height h above the ground, seen from flying height H at the horizontal distance R of the nadir, appears
-    ``R h / (H - h)`` too far out (flat ground).
+See `camera` for the geometry.
 """
 
 from __future__ import annotations
@@ -18,29 +12,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..raster import Grid, Image
+from .camera import camera_position, registration_offset
 from .groundcover import cover_codes
 from .lighting import AMBIENT, HAZE, colour_surface, sun_vector
-from .recipe import SceneParameters
 from .streams import counter_key, fractal_tile, gauss, stream, uniform
 from .surface import rasterise
 from .world import World, ground_at
 
-__all__ = ["camera_position", "photograph"]
+__all__ = ["photograph"]
 
 _BLOCK = 8
 _TILE = 512
 _NOISE = 1 << 16
-
-
-def camera_position(recipe: SceneParameters, seed: int) -> tuple[float, float, float]:
-    """Return the projection centre in local coordinates; its azimuth is the seed's, its distance the recipe's."""
-    turn = stream(seed, "image").random() * 2 * math.pi
-    away = recipe.flying_height * math.tan(math.radians(recipe.view_angle))
-    return (
-        recipe.width / 2 + away * math.cos(turn),
-        recipe.height / 2 + away * math.sin(turn),
-        recipe.elevation + recipe.flying_height,
-    )
 
 
 def photograph(world: World, origin: tuple[float, float]) -> Image | None:
@@ -54,7 +37,7 @@ def photograph(world: World, origin: tuple[float, float]) -> Image | None:
     fine, coarse = fractal_tile(rng, _TILE, 4, 0.8), fractal_tile(rng, _TILE, 64, 0.62)
     surface = rasterise(world, grid, fine)
     colours = colour_surface(world, surface, cover_codes(world, grid), (fine, coarse), len(names))
-    shift = _shift(recipe, world.seed)
+    shift = registration_offset(recipe, world.seed)
     terrain = world.terrain
     leaning = np.empty_like(colours)
     _lean(
@@ -76,12 +59,6 @@ def photograph(world: World, origin: tuple[float, float]) -> Image | None:
     values = _expose(leaning, _kernel(recipe.blur), recipe.image_noise, counter_key(world.seed, "image"))
     moved = Grid(grid.west + origin[0], grid.north + origin[1], grid.gsd, grid.rows, grid.columns)
     return Image(values, names, moved)
-
-
-def _shift(recipe: SceneParameters, seed: int) -> tuple[float, float]:
-    """Return the registration error: its length is the recipe's, its direction the seed's."""
-    turn = stream(seed, "image").random(2)[1] * 2 * math.pi
-    return recipe.registration_shift * math.cos(turn), recipe.registration_shift * math.sin(turn)
 
 
 def _kernel(sigma: float) -> NDArray[np.float32]:

@@ -146,6 +146,11 @@ class SceneParameters(Parameterised):
         maximum=5,
         doc="standard deviation of the DEM's own error, vertical; three times that in place",
     )
+    digitised: str = parameter(
+        "ground",
+        choices=("ground", "image"),
+        doc="where the reference is measured: on the ground, or in the orthoimage, leaning and shifted with it",
+    )
     reference_error: float = parameter(
         0.0, unit="m", minimum=0, maximum=3, doc="digitising error of a corner, each axis"
     )

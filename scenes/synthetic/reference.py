@@ -1,10 +1,16 @@
-"""The reference: the entities of every building, with the building's id (see `entities`)."""
+"""The reference: the entities of every building, with the building's id (see `entities`).
+
+It is measured on the ground, as in a cadastral register, or in the orthoimage by a person, as in the papers
+("monoscopic image measurement", Awrangjeb et al. 2010, section 4.3): then every rectangle lies where its eaves appear,
+so that it leans and shifts with the image.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..footprints import Footprints
+from .camera import appearance
 from .entities import entities
 from .solids import Body
 from .streams import stream
@@ -19,7 +25,13 @@ def digitise(world: World, origin: tuple[float, float]) -> Footprints:
     rows = np.flatnonzero(solids.body == Body.BUILDING)
     corners = _corners(solids.rectangle[rows])
     kept = entities(corners, solids.heights[rows], solids.owner[rows])
-    corners, rows = corners[kept] + origin, rows[kept]
+    corners, rows = corners[kept], rows[kept]
+    if world.recipe.digitised == "image":
+        eaves = np.broadcast_to(solids.eave[rows][:, None, None], (*corners.shape[:2], 1))
+        middle = np.concatenate([corners.mean(axis=1, keepdims=True), eaves[:, :1]], axis=-1)
+        # As a whole: a rectangle stays one.
+        corners = corners + appearance(middle, world.terrain, world.recipe, world.seed) - middle[..., :2]
+    corners = corners + origin
     error = world.recipe.reference_error
     if error > 0:
         # One draw per solid, so that the error of a corner does not depend on what else is in the scene.

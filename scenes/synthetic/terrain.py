@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +16,10 @@ from .recipe import SceneParameters
 from .solids import Solid
 from .streams import fractal_field, stream
 
-if TYPE_CHECKING:
-    from .world import World
-
-__all__ = ["distance_to_rectangle", "measured_dem", "natural_terrain", "terraced"]
+__all__ = ["distance_to_rectangle", "natural_terrain", "terraced"]
 
 _MARGIN = 24.0
 _FADE = 5.0
-#: Horizontal error of the DEM relative to its vertical one.
-_HORIZONTAL = 3.0
 
 
 def natural_terrain(recipe: SceneParameters, seed: int) -> Elevation:
@@ -118,20 +112,3 @@ def distance_to_rectangle(x: NDArray[np.float64], y: NDArray[np.float64], solid:
     across = np.abs(-sine * (x - solid.x) + cosine * (y - solid.y)) - solid.width / 2
     beyond: NDArray[np.float64] = np.hypot(np.maximum(along, 0), np.maximum(across, 0))
     return beyond
-
-
-def measured_dem(world: World, origin: tuple[float, float]) -> Elevation:
-    """Return the DEM that is handed out: 1 m cells over the extent, with an error of its own."""
-    recipe = world.recipe
-    grid = Grid.covering((0, 0, recipe.width, recipe.height), 1.0)
-    x, y = grid.to_world(np.arange(grid.rows)[:, None] + 0.5, np.arange(grid.columns)[None, :] + 0.5)
-    rng = stream(world.seed, "dem")
-    smooth = fractal_field(rng, grid.shape, grid.gsd, (35.0, 12.0, 4.0), 0.6)
-    rough = rng.random(grid.shape) + rng.random(grid.shape) + rng.random(grid.shape) - 1.5
-    error = recipe.dem_error * (0.9 * smooth / max(float(smooth.std()), 1e-9) + 0.35 * rough / 0.5)
-    # A survey is several times less sure of where a height lies than of the height, which matters on slopes.
-    aside = [fractal_field(rng, grid.shape, grid.gsd, (80.0, 30.0), 0.6) for _ in range(2)]
-    aside = [_HORIZONTAL * recipe.dem_error * field / max(float(field.std()), 1e-9) for field in aside]
-    values = world.terrain.sample(x + aside[0], y + aside[1]) + error
-    moved = Grid(grid.west + origin[0], grid.north + origin[1], grid.gsd, grid.rows, grid.columns)
-    return Elevation(values.astype(np.float32), moved)

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from roofbench.scenes.raster import Elevation, Grid
+from roofbench.scenes.synthetic.camera import camera_position
 from roofbench.scenes.synthetic.lidar import scan
 from roofbench.scenes.synthetic.lighting import sun_vector, sunlit
-from roofbench.scenes.synthetic.orthoimage import camera_position, photograph
+from roofbench.scenes.synthetic.orthoimage import photograph
 from roofbench.scenes.synthetic.recipe import SceneParameters
+from roofbench.scenes.synthetic.reference import digitise
 from roofbench.scenes.synthetic.solids import Body, Roof, Solid, Solids
 from roofbench.scenes.synthetic.streams import fractal_tile, stream
 from roofbench.scenes.synthetic.surface import rasterise
+from roofbench.scenes.synthetic.survey import measured_dem
 from roofbench.scenes.synthetic.world import make_world
 
 WHITE, BLACK = (0.9, 0.9, 0.9, 0.9), (0.06, 0.06, 0.06, 0.06)
@@ -68,6 +71,20 @@ def test_the_registration_shift_moves_the_image_and_nothing_else():
     other_x, other_y, _ = bright_part(photograph(shifted, (0.0, 0.0)))
     assert math.hypot(other_x - x, other_y - y) == pytest.approx(2.0, abs=0.1)
     np.testing.assert_array_equal(scan(plain, (0.0, 0.0)).z, scan(shifted, (0.0, 0.0)).z)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_reference_digitised_in_the_image_lies_where_the_roof_is_seen(seed):
+    parameters = {"view_angle": 12, "registration_shift": 1.5, "sun_elevation": 89, "gsd": 0.1, "digitised": "image"}
+    world = flat_world(tower(25.0, x=70.0, y=50.0, angle=0.3), seed=seed, **parameters)
+    image = photograph(world, (0.0, 0.0))
+    rows, columns = np.nonzero(image.values.min(axis=0) > 215)
+    x, y = image.grid.to_world(rows + 0.5, columns + 0.5)
+    outline = digitise(world, (0.0, 0.0)).polygons[0]
+    assert outline.bounds == pytest.approx((x.min(), y.min(), x.max(), y.max()), abs=0.3)
+    assert math.hypot(outline.centroid.x - 70, outline.centroid.y - 50) > 1
+    ground = digitise(dataclasses.replace(world, recipe=SceneParameters()), (0.0, 0.0)).polygons[0].centroid
+    assert (ground.x, ground.y) == pytest.approx((70, 50), abs=0.01)
 
 
 @pytest.mark.parametrize("elevation", [25.0, 45.0, 70.0])
@@ -168,17 +185,43 @@ def test_vertical_noise_has_the_deviation_asked_for(sigma):
 
 
 def test_the_dem_is_the_bare_earth_but_for_its_own_error():
-    from roofbench.scenes.synthetic.terrain import measured_dem
-
-    world = make_world(SceneParameters(buildings=20, slope=4, dem_error=0.3), 1)
+    world = make_world(SceneParameters(buildings=0, tree_density=0, clutter=0, slope=4, dem_error=0.3), 1)
     dem = measured_dem(world, (0.0, 0.0))
     x, y = np.meshgrid(np.arange(5.5, 245), np.arange(5.5, 245))
     error = dem.sample(x, y) - world.terrain.sample(x, y)
     assert float(error.std()) == pytest.approx(0.3, rel=0.15)
-    exact = measured_dem(
-        dataclasses.replace(world, recipe=SceneParameters(buildings=20, slope=4, dem_error=0)), (0.0, 0.0)
+    exact = measured_dem(dataclasses.replace(world, recipe=dataclasses.replace(world.recipe, dem_error=0)), (0.0, 0.0))
+    np.testing.assert_allclose(exact.sample(x, y), world.terrain.sample(x, y), atol=0.01)
+
+
+@pytest.mark.parametrize("slope", [0.0, 15.0])
+def test_the_dem_errs_more_on_slopes_by_its_error_in_place(slope):
+    world = make_world(
+        SceneParameters(buildings=0, tree_density=0, clutter=0, slope=slope, undulation=0, dem_error=0.2), 1
     )
-    np.testing.assert_allclose(exact.sample(x, y), world.terrain.sample(x, y), atol=1e-3)
+    x, y = np.meshgrid(np.arange(5.5, 245), np.arange(5.5, 245))
+    error = measured_dem(world, (0.0, 0.0)).sample(x, y) - world.terrain.sample(x, y)
+    expected = math.hypot(0.2, 3 * 0.2 * math.tan(math.radians(slope)))
+    assert float(error.std()) == pytest.approx(expected, rel=0.2)
+
+
+def test_the_dem_knows_the_pad_below_a_house_only_by_its_rim():
+    """Below a building it is interpolated from the ground around, which is uphill higher than downhill."""
+    recipe = SceneParameters(
+        buildings=20, slope=12, undulation=0, terracing=1, dem_error=0, tree_density=0, clutter=0, outbuildings=0
+    )
+    world = make_world(recipe, 1)
+    dem = measured_dem(world, (0.0, 0.0))
+    solids = world.solids
+    rises, levels = [], []
+    for row in np.flatnonzero((solids.body == Body.BUILDING) & (solids.areas > 80)):
+        x, y, angle, length, width = solids.rectangle[row]
+        along, across = (np.array(pair) for pair in np.meshgrid((-0.45, 0.45), (-0.45, 0.45)))
+        east = x + math.cos(angle) * along * length - math.sin(angle) * across * width
+        north = y + math.sin(angle) * along * length + math.cos(angle) * across * width
+        levels.append(np.ptp(world.terrain.sample(east, north)))
+        rises.append(np.ptp(dem.sample(east, north)))
+    assert np.median(rises) > 3 * np.median(levels)
 
 
 def test_solids_agree_between_laser_and_camera():

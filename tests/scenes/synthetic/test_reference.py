@@ -50,7 +50,8 @@ def test_references_are_rectangles_inside_the_extent(pair):
     assert len(index) == len(scene.reference)
     edges = np.roll(corners, -1, axis=1) - corners
     assert np.abs((edges * np.roll(edges, -1, axis=1)).sum(axis=-1)).max() < 0.1
-    assert shapely.box(*scene.extent).contains(shapely.union_all(scene.reference.polygons))
+    # Digitised in the image, a roof at its border leans out by some decimetres.
+    assert shapely.box(*scene.extent).buffer(1).contains(shapely.union_all(scene.reference.polygons))
 
 
 def test_parts_of_one_building_overlap_and_those_of_two_do_not(pair):
