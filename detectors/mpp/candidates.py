@@ -142,22 +142,36 @@ def _row_ends(cells):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def _bounding_area(cells, angle):  # type: ignore[no-untyped-def]
+    """Area of the bounding rectangle at an angle."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
+    for i in range(len(cells)):
+        u = cells[i, 1] * cos + cells[i, 0] * sin
+        v = cells[i, 0] * cos - cells[i, 1] * sin
+        low_u, high_u = min(low_u, u), max(high_u, u)
+        low_v, high_v = min(low_v, v), max(high_v, v)
+    return (high_u - low_u + 1.0) * (high_v - low_v + 1.0)
+
+
+@njit(cache=True, nogil=True)
 def _best_angle(cells):  # type: ignore[no-untyped-def]
-    """Angle in a quarter turn at which the bounding rectangle is smallest."""
+    """Angle in a quarter turn at which the bounding rectangle is smallest, to an eighth of the first step."""
     best, best_angle = np.inf, 0.0
     for k in range(_ANGLES):
         angle = 0.5 * math.pi * k / _ANGLES
-        cos, sin = math.cos(angle), math.sin(angle)
-        low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
-        for i in range(len(cells)):
-            u = cells[i, 1] * cos + cells[i, 0] * sin
-            v = cells[i, 0] * cos - cells[i, 1] * sin
-            low_u, high_u = min(low_u, u), max(high_u, u)
-            low_v, high_v = min(low_v, v), max(high_v, v)
-        area = (high_u - low_u + 1.0) * (high_v - low_v + 1.0)
+        area = _bounding_area(cells, angle)
         if area < best:
             best, best_angle = area, angle
-    return best_angle
+    turn = 0.25 * math.pi / _ANGLES
+    for _ in range(3):
+        middle = best_angle
+        for side in (-1.0, 1.0):
+            area = _bounding_area(cells, middle + side * turn)
+            if area < best:
+                best, best_angle = area, middle + side * turn
+        turn *= 0.5
+    return best_angle % (0.5 * math.pi)
 
 
 @njit(cache=True, nogil=True)

@@ -31,7 +31,7 @@ from .annealing import Annealed, Schedule, anneal
 from .background import Background, estimate_background, score_cells, textures
 from .candidates import propose_boxes
 from .cells import HIGH, Cells, cell_size, make_cells
-from .energy import Model, own_energy
+from .energy import Model, ground_variance, own_energy
 from .figures import draw_convergence, draw_evidence, draw_heights, draw_rectangles
 from .moves import MOVES
 from .polish import polish
@@ -110,6 +110,13 @@ class MPP(Detector):
     least_tau: float = parameter(
         0.15, unit="m", minimum=0.01, doc="least standard deviation of heights around a roof", swept=(0.1, 0.15, 0.3)
     )
+    ground_error: float = parameter(
+        0.005,
+        minimum=0,
+        maximum=0.1,
+        doc="metres by which the ground under a building is unknown, per metre of its longest side",
+        swept=(0, 0.005, 0.01),
+    )
     outline: str = parameter(
         "rectangles", choices=("rectangles", "blocks"), doc="one footprint a rectangle, or one a block of touching ones"
     )
@@ -122,13 +129,20 @@ class MPP(Detector):
         doc="share of a roof's rim that lower roof must carry to make it a superstructure; above 1: none is one",
         swept=(0.5, 0.65, 0.8, 1.1),
     )
+    furniture: float = parameter(
+        40.0,
+        unit="m2",
+        minimum=0,
+        doc="largest rough place that counts as furniture of the roof around it",
+        swept=(0, 20, 40, 80),
+    )
     roof_price: float = parameter(3.0, minimum=0, doc="energy per number that a roof has more than a flat one")
     texture_weight: float = parameter(
         1.0, minimum=0, doc="weight of roughness and multiple returns as evidence", swept=(0, 0.5, 1.0)
     )
     texture_limit: float = parameter(3.0, minimum=0, doc="bound of that evidence, nats per m2", swept=(2, 3, 4))
     low_price: float = parameter(3.0, minimum=0, doc="nats per m2 of low ground under a roof", swept=(2, 3, 4))
-    void_price: float = parameter(0.3, minimum=0, doc="nats per m2 without points under a roof")
+    void_price: float = parameter(0.1, minimum=0, doc="nats per m2 without points under a roof", swept=(0.05, 0.1, 0.3))
     data_births: float = parameter(
         0.9, minimum=0, maximum=0.99, doc="share of births proposed by the data; 0: uniform", swept=(0, 0.5, 0.9)
     )
@@ -232,10 +246,15 @@ class MPP(Detector):
         background, bins = estimate_background(cells)
         score, fitted = self._score(cells, bins, background)
         if self.carried_share <= 1:
-            height = lower_superstructures(
-                cells.height, cells.state, fitted, step=self.roof_step, share=self.carried_share
+            height, state = lower_superstructures(
+                cells.height,
+                cells.state,
+                fitted,
+                step=self.roof_step,
+                share=self.carried_share,
+                most=int(self.furniture / cell**2),
             )
-            cells = replace(cells, height=height)
+            cells = replace(cells, height=height, state=state)
             score, fitted = self._score(cells, textures(cells.height, cells.state, cells.openness), background)
         tables = make_tables(cells.height, fitted, score)
         model = Model(
@@ -250,6 +269,7 @@ class MPP(Detector):
             least_side=self.least_side / cell,
             largest_side=self.largest_side / cell,
             fit_weight=self.fit_weight,
+            ground_error=self.ground_error,
         )
         boxes, weights = np.empty((0, 5)), np.empty(0)
         if self.data_births > 0 or self.start == "greedy":
@@ -368,7 +388,15 @@ class MPP(Detector):
         for i, rectangle in enumerate(rectangles):
             price = model.roof_price / (model.weight * model.fit_weight) if model.fit_weight > 0 else math.inf
             fit_roof(
-                tables.small, tables.large, rectangle, price, model.least_tau, model.least_height, model.cell, fits[i]
+                tables.small,
+                tables.large,
+                rectangle,
+                price,
+                model.least_tau,
+                ground_variance(rectangle, model),
+                model.least_height,
+                model.cell,
+                fits[i],
             )
             energies[i] = own_energy(tables.small, tables.large, rectangle, model)
         if self.outline == "blocks":

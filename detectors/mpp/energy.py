@@ -18,7 +18,15 @@ from numba import njit
 from .rectangles import overlap_area
 from .roofs import choose_roof, log_likelihood, scan
 
-__all__ = ["Model", "configuration_energy", "energy_below", "least_energy", "overlaps", "own_energy"]
+__all__ = [
+    "Model",
+    "configuration_energy",
+    "energy_below",
+    "ground_variance",
+    "least_energy",
+    "overlaps",
+    "own_energy",
+]
 
 
 class Model(NamedTuple):
@@ -53,6 +61,13 @@ class Model(NamedTuple):
     least_side: float
     largest_side: float
     fit_weight: float
+    ground_error: float
+
+
+@njit(cache=True, nogil=True)
+def ground_variance(rectangle, model):  # type: ignore[no-untyped-def]
+    """Return the variance of heights, m2, that the unknown ground under a rectangle explains."""
+    return (max(rectangle[2], rectangle[3]) * model.cell * model.ground_error) ** 2
 
 
 @njit(cache=True, nogil=True)
@@ -79,7 +94,16 @@ def energy_below(small, large, rectangle, model, limit):  # type: ignore[no-unty
         return np.inf
     roof_price = model.roof_price / share
     likelihood, _, _, _ = choose_roof(
-        small, large, rectangle, moments, roof_price, model.least_tau, model.least_height, model.cell, needed
+        small,
+        large,
+        rectangle,
+        moments,
+        roof_price,
+        model.least_tau,
+        ground_variance(rectangle, model),
+        model.least_height,
+        model.cell,
+        needed,
     )
     return base - share * likelihood
 

@@ -294,7 +294,7 @@ def _plane_residual(n, u, v, uu, uv, vv, h, uh, vh, level):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True)
-def choose_roof(small, large, rectangle, moments, roof_price, least_tau, least_height, cell, needed):  # type: ignore[no-untyped-def]
+def choose_roof(small, large, rectangle, moments, roof_price, least_tau, explained, least_height, cell, needed):  # type: ignore[no-untyped-def]
     """Choose the roof of a rectangle from its moments.
 
     Parameters
@@ -303,7 +303,7 @@ def choose_roof(small, large, rectangle, moments, roof_price, least_tau, least_h
     rectangle : ndarray, shape (5,)
     moments : tuple of float
         As `scan` returns them.
-    roof_price, least_tau, least_height, cell : float
+    roof_price, least_tau, explained, least_height, cell : float
         See `fit_roof`.
     needed : float
         Roofs that cannot be likelier than this are not tried: the likelihood is right if it is more than this, else
@@ -321,38 +321,39 @@ def choose_roof(small, large, rectangle, moments, roof_price, least_tau, least_h
     if mean < least_height:
         level += n * (least_height - mean) ** 2
     residual, kind, slope = level, FLAT, 0.0
-    best = log_likelihood(n, level, least_tau)
+    slack = n * explained
+    best = log_likelihood(n, max(level - slack, 0.0), least_tau)
     if mean < least_height or n < 8.0 or roof_price == np.inf:
         return best, residual, kind, slope
     at_best = log_likelihood(n, 0.0, least_tau) - roof_price
     if at_best <= max(best, needed):
         return best, residual, kind, slope
     trial = _plane_residual(n, u, v, uu, uv, vv, h, uh, vh, level)
-    value = log_likelihood(n, trial, least_tau) - 2.0 * roof_price
+    value = log_likelihood(n, max(trial - slack, 0.0), least_tau) - 2.0 * roof_price
     if value > best:
         best, residual, kind = value, trial, PLANE
     if at_best <= best:
         return best, residual, kind, slope
     u_half, uh_half, v_half, vh_half = scan_halves(small, large, rectangle)
     along_u, slope_u = _ridge_residual(n, 2.0 * v_half - v, vv, h, 2.0 * vh_half - vh, level)
-    value = log_likelihood(n, along_u, least_tau) - roof_price
+    value = log_likelihood(n, max(along_u - slack, 0.0), least_tau) - roof_price
     if value > best:
         best, residual, kind, slope = value, along_u, GABLE_U, slope_u / cell
     along_v, slope_v = _ridge_residual(n, 2.0 * u_half - u, uu, h, 2.0 * uh_half - uh, level)
-    value = log_likelihood(n, along_v, least_tau) - roof_price
+    value = log_likelihood(n, max(along_v - slack, 0.0), least_tau) - roof_price
     if value > best:
         best, residual, kind, slope = value, along_v, GABLE_V, slope_v / cell
     steep = (slope_u if rectangle[2] >= rectangle[3] else slope_v) / cell
-    if kind >= GABLE_U and steep > _STEEP and residual > n * least_tau * least_tau:
+    if kind >= GABLE_U and steep > _STEEP and residual - slack > n * least_tau * least_tau:
         trial, slope_h = _hip_residual(small, large, rectangle, n, h, level)
-        value = log_likelihood(n, trial, least_tau) - roof_price
+        value = log_likelihood(n, max(trial - slack, 0.0), least_tau) - roof_price
         if value > best:
             best, residual, kind, slope = value, trial, HIP, slope_h / cell
     return best, residual, kind, slope
 
 
 @njit(cache=True, nogil=True)
-def fit_roof(small, large, rectangle, roof_price, least_tau, least_height, cell, fit):  # type: ignore[no-untyped-def]
+def fit_roof(small, large, rectangle, roof_price, least_tau, explained, least_height, cell, fit):  # type: ignore[no-untyped-def]
     """Choose the roof of a rectangle.
 
     Parameters
@@ -361,7 +362,11 @@ def fit_roof(small, large, rectangle, roof_price, least_tau, least_height, cell,
     rectangle : ndarray, shape (5,)
     roof_price : float
         Nats per number that a roof has more than a flat one; infinite allows flat roofs alone.
-    least_tau, least_height : float
+    least_tau : float
+        Metres.
+    explained : float
+        Variance of heights, m2, that is no roof's: what exceeds it counts.
+    least_height : float
         Metres. A roof whose mean height is below the least height is a flat one at the least height.
     cell : float
         Metres.
@@ -379,7 +384,7 @@ def fit_roof(small, large, rectangle, roof_price, least_tau, least_height, cell,
     """
     moments = scan(small, large, rectangle)
     best, residual, kind, slope = choose_roof(
-        small, large, rectangle, moments, roof_price, least_tau, least_height, cell, -np.inf
+        small, large, rectangle, moments, roof_price, least_tau, explained, least_height, cell, -np.inf
     )
     n = max(moments[2], 1.0)
     fit[0], fit[1], fit[2] = moments[2], moments[8] / n, max(math.sqrt(residual / n), least_tau)

@@ -22,10 +22,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .candidates import label_patches
-from .cells import HIGH, VOID
+from .candidates import label_patches, propose_boxes
+from .cells import HIGH, LOW, VOID
+from .frames import lower_storeys
 
 __all__ = ["lower_superstructures"]
+
+#: Centimetres by which cells of a ledge differ at most.
+_LEDGE = 30
+#: Longest run of void cells that a tower's shadow leaves on a roof.
+_SHADOW = 12
 
 
 def lower_superstructures(
@@ -35,9 +41,10 @@ def lower_superstructures(
     *,
     step: float,
     share: float,
+    most: int,
     rounds: int = 5,
-) -> NDArray[np.int32]:
-    """Return the heights with superstructures lowered to the roofs that carry them.
+) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Return heights and states with superstructures lowered to the roofs that carry them, and their shadows filled.
 
     Parameters
     ----------
@@ -50,21 +57,92 @@ def lower_superstructures(
         Metres by which neighbouring cells of a patch differ at most.
     share : float
         Share of the rim that must be lower roof; more than 1 changes nothing.
+    most : int
+        Cells that a rough place may have to count as furniture of the roof around it.
     rounds : int
         Towers on towers that are lowered.
     """
     if share > 1:
-        return height
-    lowered = height.copy()
+        return height, state
+    lowered, state = _lower_storeys(height, state, roof, round(100 * step))
     for turn in range(rounds):
         labels, count = label_patches(lowered, roof, round(100 * step))
         for _ in range(8 if turn == 0 else 0):
             if not _smooth_walls(lowered, state, labels):
                 break
+        if turn == 0 and _fill_rough(lowered, state, labels, share, most):
+            labels, count = label_patches(lowered, labels > 0, round(100 * step))
         roof = labels > 0
         if not _lower(lowered, state, labels, count, share):
             break
-    return lowered
+    return lowered, state
+
+
+def _lower_storeys(
+    height: NDArray[np.int32], state: NDArray[np.uint8], roof: NDArray[np.bool_], step: int
+) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Return heights and states with the storeys of frames lowered."""
+    smooth, lowered, filled = height.copy(), height.copy(), state.copy()
+    labels, count = label_patches(smooth, _with_ledges(height, state, roof), step)
+    for _ in range(8):
+        if not _smooth_walls(smooth, state, labels):
+            break
+    boxes = np.concatenate(
+        [
+            propose_boxes(smooth, _with_shadows(state), steps=(1e6,), least_cells=24),
+            propose_boxes(smooth, labels > 0, steps=(0.01 * step,), least_cells=24),
+        ]
+    )
+    boxes = boxes[np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")]
+    lower_storeys(lowered, filled, labels, count, boxes, step)
+    return lowered, filled
+
+
+@njit(cache=True, nogil=True)
+def _with_shadows(state):  # type: ignore[no-untyped-def]
+    """Return the high cells, and the runs of void ones between two of them in a row or a column: shadows of towers."""
+    rows, columns = state.shape
+    solid = state == HIGH
+    for r in range(rows):
+        last = -_SHADOW
+        for c in range(columns):
+            if state[r, c] == HIGH:
+                if 1 < c - last <= _SHADOW:
+                    solid[r, last + 1 : c] = True
+                last = c
+            elif state[r, c] == LOW:
+                last = -_SHADOW
+    for c in range(columns):
+        last = -_SHADOW
+        for r in range(rows):
+            if state[r, c] == HIGH:
+                if 1 < r - last <= _SHADOW:
+                    solid[last + 1 : r, c] = True
+                last = r
+            elif state[r, c] == LOW:
+                last = -_SHADOW
+    return solid
+
+
+@njit(cache=True, nogil=True)
+def _with_ledges(height, state, roof):  # type: ignore[no-untyped-def]
+    """Return the roof cells and the high cells that share their height with four of their eight neighbours.
+
+    A ledge around a tower is too narrow for a window of texture, and level nevertheless.
+    """
+    rows, columns = state.shape
+    solid = roof.copy()
+    for r in range(1, rows - 1):
+        for c in range(1, columns - 1):
+            if roof[r, c] or state[r, c] != HIGH:
+                continue
+            level = 0
+            for i in range(r - 1, r + 2):
+                for j in range(c - 1, c + 2):
+                    if state[i, j] == HIGH and abs(height[i, j] - height[r, c]) <= _LEDGE:
+                        level += 1
+            solid[r, c] = level > 4
+    return solid
 
 
 @njit(cache=True, nogil=True)
@@ -91,6 +169,46 @@ def _smooth_walls(height, state, labels):  # type: ignore[no-untyped-def]
                             nearest, label, carrier = gap, before[i, j], level[i, j]
             if known >= 5:
                 labels[r, c], height[r, c] = label, carrier
+                found = True
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _fill_rough(height, state, labels, share, most):  # type: ignore[no-untyped-def]
+    """Level rough places that roof surrounds, in place: they take the lower half of its height; return whether any."""
+    rows, columns = state.shape
+    rough, count = label_patches(height, (state == HIGH) & (labels == 0), 1 << 30)
+    size = np.zeros(count + 1, dtype=np.int64)
+    rim = np.zeros(count + 1, dtype=np.int64)
+    roof = np.zeros((2, count + 1), dtype=np.int64)
+    level = np.zeros((2, count + 1), dtype=np.int64)
+    for half in range(2):
+        for r in range(rows):
+            for c in range(columns):
+                place = rough[r, c]
+                if place == 0:
+                    continue
+                size[place] += 1 - half
+                for side in range(4):
+                    i = r + (1 if side == 0 else (-1 if side == 1 else 0))
+                    j = c + (1 if side == 2 else (-1 if side == 3 else 0))
+                    if i < 0 or j < 0 or i >= rows or j >= columns:
+                        rim[place] += 1 - half
+                    elif rough[i, j] == 0 and state[i, j] != VOID:
+                        rim[place] += 1 - half
+                        if labels[i, j] > 0 and (half == 0 or height[i, j] <= level[0, place]):
+                            roof[half, place] += 1
+                            level[half, place] += height[i, j]
+        for place in range(1, count + 1):
+            if roof[half, place] > 0:
+                level[half, place] = level[half, place] // roof[half, place]
+    found = False
+    for r in range(rows):
+        for c in range(columns):
+            place = rough[r, c]
+            if place > 0 and roof[1, place] > 0 and size[place] <= most and roof[0, place] >= share * rim[place]:
+                height[r, c] = level[1, place]
+                labels[r, c] = 1
                 found = True
     return found
 

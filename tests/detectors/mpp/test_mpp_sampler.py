@@ -37,6 +37,7 @@ def model(**changes):
         "overlap": 5.0,
         "roof_price": 3.0,
         "least_tau": 0.15,
+        "ground_error": 0.0,
         "least_height": 2.5,
         "cell": 0.5,
         "void_price": 0.3,

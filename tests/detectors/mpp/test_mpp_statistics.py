@@ -46,6 +46,7 @@ def model(**changes):
         "overlap": 5.0,
         "roof_price": 3.0,
         "least_tau": 0.15,
+        "ground_error": 0.0,
         "least_height": 2.5,
         "cell": 0.5,
         "void_price": 0.3,
@@ -122,7 +123,7 @@ def test_the_roof_that_stands_there_is_found_with_its_spread(kind):
     height = np.round(100 * (9 + surface + rng.normal(0, 0.2, u.shape))).astype(np.int32)
     tables = make_tables(height, np.ones(u.shape, bool), np.zeros(u.shape, np.float32))
     fit = np.empty(5)
-    likelihood, _, _ = fit_roof(tables.small, tables.large, rectangle, 3.0, 0.15, 2.5, 0.5, fit)
+    likelihood, _, _ = fit_roof(tables.small, tables.large, rectangle, 3.0, 0.15, 0.0, 2.5, 0.5, fit)
     inside = naive.cells_inside(rectangle, ROWS, COLUMNS)
     residuals = naive.roof_residuals(0.01 * height[inside], u[inside], v[inside], 26.0, 14.0)
     assert KINDS[int(fit[3])] == KINDS[kind]
@@ -138,7 +139,7 @@ def test_a_flat_roof_below_the_least_height_is_measured_from_it():
     )
     fit = np.empty(5)
     rectangle = np.array([20.0, 20.0, 10.0, 10.0, 0.0])
-    likelihood, _, _ = fit_roof(tables.small, tables.large, rectangle, 3.0, 0.15, 2.5, 0.5, fit)
+    likelihood, _, _ = fit_roof(tables.small, tables.large, rectangle, 3.0, 0.15, 0.0, 2.5, 0.5, fit)
     assert fit[2] == pytest.approx(0.3)
     assert likelihood == pytest.approx(naive.log_normal_sum(100 * 0.3**2, 100, 0.15))
 
