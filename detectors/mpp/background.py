@@ -32,6 +32,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .cells import HIGH, LOW, Cells
+from .tables import MILLI
+from .workers import ALONE, Workers
 
 __all__ = ["Background", "estimate_background", "score_cells", "textures"]
 
@@ -75,14 +77,29 @@ class Background:
     cells: int
 
 
+def textures(
+    height: NDArray[np.int32], state: NDArray[np.uint8], openness: NDArray[np.uint8], *, workers: Workers = ALONE
+) -> NDArray[np.int16]:
+    """Return the bin of the texture of each cell, -1 where no window holds it: shape (rows, columns)."""
+    rows = state.shape[0]
+    windows, bins = np.empty(state.shape, dtype=np.int16), np.empty(state.shape, dtype=np.int16)
+    workers.bands(lambda first, last: _describe_windows(height, state, openness, first, last, windows), rows)
+    workers.bands(lambda first, last: _choose_windows(windows, state, first, last, bins), rows)
+    return bins
+
+
+#: Bin of what is no window.
+_NONE = np.int16(_ROUGH_BINS * _OPEN_BINS)
+
+
 @njit(cache=True, nogil=True)
-def textures(height, state, openness):  # type: ignore[no-untyped-def]
-    """Return the bin of the texture of each cell, -1 where no window holds it: shape (rows, columns), int16."""
+def _describe_windows(height, state, openness, first, last, windows):  # type: ignore[no-untyped-def]
+    """Fill the bin of the window around each cell of some rows."""
     rows, columns = state.shape
-    bins = np.full((rows, columns), np.int16(_ROUGH_BINS * _OPEN_BINS), dtype=np.int16)
-    for r in range(1, rows - 1):
-        for c in range(1, columns - 1):
-            if state[r, c] != HIGH:
+    for r in range(first, last):
+        for c in range(columns):
+            windows[r, c] = _NONE
+            if state[r, c] != HIGH or r == 0 or r == rows - 1 or c == 0 or c == columns - 1:
                 continue
             total, squares, east, south, openly = 0, 0, 0, 0, 0
             whole = True
@@ -103,14 +120,24 @@ def textures(height, state, openness):  # type: ignore[no-untyped-def]
             share = (math.log(max(rough, 0.01)) - _LOG_LOW) / (_LOG_HIGH - _LOG_LOW)
             a = min(int(share * _ROUGH_BINS), _ROUGH_BINS - 1)
             b = min(int(openly / 9.0 / 255.0 * _OPEN_BINS), _OPEN_BINS - 1)
-            for i in range(-1, 2):
-                for j in range(-1, 2):
-                    bins[r + i, c + j] = min(bins[r + i, c + j], a * _OPEN_BINS + b)
-    for r in range(rows):
+            windows[r, c] = a * _OPEN_BINS + b
+
+
+@njit(cache=True, nogil=True)
+def _choose_windows(windows, state, first, last, bins):  # type: ignore[no-untyped-def]
+    """Give each cell of some rows the bin of the smoothest window that holds it."""
+    rows, columns = windows.shape
+    for r in range(first, last):
         for c in range(columns):
-            if bins[r, c] == _ROUGH_BINS * _OPEN_BINS:
-                bins[r, c] = -1
-    return bins
+            bins[r, c] = -1
+            if state[r, c] != HIGH:
+                continue
+            least = _NONE
+            for i in range(max(r - 1, 0), min(r + 2, rows)):
+                for j in range(max(c - 1, 0), min(c + 2, columns)):
+                    least = min(least, windows[i, j])
+            if least < _NONE:
+                bins[r, c] = least
 
 
 @njit(cache=True, nogil=True)
@@ -128,9 +155,9 @@ def _tally(bins, height):  # type: ignore[no-untyped-def]
     return tally
 
 
-def estimate_background(cells: Cells) -> tuple[Background, NDArray[np.int16]]:
+def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Background, NDArray[np.int16]]:
     """Estimate the classes of a scene; also return the bin of each cell's texture (-1: no window holds it)."""
-    bins = textures(cells.height, cells.state, cells.openness)
+    bins = textures(cells.height, cells.state, cells.openness, workers=workers)
     tally = _tally(bins, cells.height)
     counts = tally[:, 0].astype(np.float64).reshape(_ROUGH_BINS, _OPEN_BINS)
     rough = _LOG_LOW + (np.arange(_ROUGH_BINS) + 0.5) * (_LOG_HIGH - _LOG_LOW) / _ROUGH_BINS
@@ -191,8 +218,9 @@ def score_cells(
     texture_limit: float,
     low_price: float,
     void_price: float,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return the score of each cell in nats, and whether its height takes part in the fit of a roof.
+    workers: Workers = ALONE,
+) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
+    """Return the score of each cell in thousandths of a nat, and whether its height takes part in the fit of a roof.
 
     A high cell whose texture speaks against a roof (a wall, a chimney, a branch over the eaves) pays its evidence, but
     does not spoil the fit: a Gaussian would let a few such cells outweigh a thousand good ones.
@@ -208,38 +236,41 @@ def score_cells(
         bound of its absolute value, nats.
     low_price, void_price : float
         Nats that a low and a void cell cost.
+    workers : Workers
     """
     evidence = np.clip(texture_weight * np.array(background.evidence), -texture_limit, texture_limit).ravel()
-    return _score(  # type: ignore[no-any-return]
-        cells.height,
-        cells.state,
-        bins,
-        evidence,
-        background.crown_height,
-        background.crown_spread,
-        fit_weight,
-        texture_weight * _THIN,
-        low_price,
-        void_price,
-    )
+    score, fitted = np.empty(bins.shape, dtype=np.int16), np.empty(bins.shape, dtype=np.bool_)
+    crowns = (background.crown_height, background.crown_spread)
+    prices = (texture_weight * _THIN, low_price, void_price)
+
+    def work(first: int, last: int) -> None:
+        _score(cells.height, cells.state, bins, evidence, crowns, fit_weight, prices, first, last, score, fitted)
+
+    workers.bands(work, len(bins))
+    return score, fitted
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _milli(nats):  # type: ignore[no-untyped-def]
+    """Return thousandths of a nat, within what 16 bits hold."""
+    return np.int16(min(max(round(nats * MILLI), -32767), 32767))
 
 
 @njit(cache=True, nogil=True)
-def _score(height, state, bins, evidence, mean, spread, fit_weight, thin, low_price, void_price):  # type: ignore[no-untyped-def]
-    rows, columns = state.shape
-    score = np.full((rows, columns), -void_price, dtype=np.float32)
-    fitted = np.zeros((rows, columns), dtype=np.bool_)
+def _score(height, state, bins, evidence, crowns, fit_weight, prices, first, last, score, fitted):  # type: ignore[no-untyped-def]
+    mean, spread = crowns
+    thin, low_price, void_price = prices
     level = -math.log(spread * math.sqrt(2.0 * math.pi))
-    for r in range(rows):
-        for c in range(columns):
+    for r in range(first, last):
+        for c in range(state.shape[1]):
+            score[r, c], fitted[r, c] = _milli(-void_price), False
             if state[r, c] == LOW:
-                score[r, c] = -low_price
+                score[r, c] = _milli(-low_price)
             elif state[r, c] == HIGH:
                 best = evidence[bins[r, c]] if bins[r, c] >= 0 else thin
                 if best < 0.0:
-                    score[r, c] = best
+                    score[r, c] = _milli(best)
                     continue
                 fitted[r, c] = True
                 log_crown = level - 0.5 * ((0.01 * height[r, c] - mean) / spread) ** 2
-                score[r, c] = best - fit_weight * max(log_crown, _HEIGHT_FLOOR)
-    return score, fitted
+                score[r, c] = _milli(best - fit_weight * max(log_crown, _HEIGHT_FLOOR))

@@ -21,6 +21,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .workers import ALONE, Workers
+
 __all__ = ["label_patches", "propose_boxes"]
 
 #: Angles tried in a quarter turn.
@@ -37,6 +39,7 @@ def propose_boxes(
     *,
     steps: tuple[float, ...],
     least_cells: int,
+    workers: Workers = ALONE,
 ) -> NDArray[np.float64]:
     """Return boxes of the patches of several step limits, shape (n, 5), without doubles.
 
@@ -46,17 +49,15 @@ def propose_boxes(
         Centimetres.
     roof : ndarray of bool, shape (rows, columns)
     steps : tuple of float
-        Limits in metres.
+        Limits in metres, rising.
     least_cells : int
         Smaller patches and pieces are left out.
+    workers : Workers
     """
-    found = [np.empty((0, 5))]
-    finer = np.zeros((1, 1), dtype=np.int32)
-    for step in steps:
-        labels, count = label_patches(height, roof, round(100 * step))
-        found.append(_boxes(labels, count, finer, least_cells))
-        finer = labels
-    boxes = np.concatenate(found)
+    labelled = workers.map(lambda step: label_patches(height, roof, round(100 * step)), steps)
+    finer = [np.zeros((1, 1), dtype=np.int32), *(labels for labels, _ in labelled)]
+    jobs = [(labels, count, fine, least_cells) for (labels, count), fine in zip(labelled, finer, strict=False)]
+    boxes = np.concatenate([np.empty((0, 5)), *workers.map(lambda job: _boxes(*job), jobs)])
     return boxes[np.sort(np.unique(np.round(boxes, 3), axis=0, return_index=True)[1])]
 
 

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +29,7 @@ from numpy.typing import NDArray
 
 from ...scenes.points import PointCloud
 from ...scenes.raster import Elevation, Grid
+from .workers import ALONE, Workers
 
 __all__ = ["HIGH", "LOW", "VOID", "Cells", "cell_size", "make_cells"]
 
@@ -98,8 +98,7 @@ def make_cells(
     grid: Grid,
     *,
     low: float,
-    workers: Executor | None = None,
-    bands: int = 1,
+    workers: Workers = ALONE,
 ) -> Cells:
     """Sort the points into cells.
 
@@ -113,8 +112,7 @@ def make_cells(
         Working grid.
     low : float
         Low limit in metres above ground.
-    workers, bands
-        Threads and the number of row bands the work is split into; neither changes the result.
+    workers : Workers
     """
     size = grid.rows * grid.columns
     counts, tops = np.zeros((size, 4), dtype=np.int32), np.zeros((size, 2), dtype=np.int32)
@@ -131,11 +129,7 @@ def make_cells(
         _count(*cloud, returns, elevation, place, frame, first, last, grid.columns, lowest, counts)
         _add_tops(*cloud, elevation, place, frame, first, last, grid.columns, counts, tops)
 
-    if workers is None or bands == 1:
-        work(0, grid.rows)
-    else:
-        edges = np.linspace(0, grid.rows, bands + 1).astype(int)
-        list(workers.map(work, edges[:-1].tolist(), edges[1:].tolist()))
+    workers.bands(work, grid.rows)
     height, state, openness = _summarise(counts, tops, *grid.shape)
     return Cells(grid, height, state, openness)
 

@@ -25,6 +25,7 @@ __all__ = [
     "ground_variance",
     "least_energy",
     "overlaps",
+    "own_energies",
     "own_energy",
 ]
 
@@ -74,6 +75,15 @@ def ground_variance(rectangle, model):  # type: ignore[no-untyped-def]
 def own_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def]
     """Return the energy of a rectangle by itself."""
     return energy_below(small, large, rectangle, model, np.inf)
+
+
+@njit(cache=True, nogil=True)
+def own_energies(small, large, rectangles, model):  # type: ignore[no-untyped-def]
+    """Return the energy of each rectangle by itself, shape (n,)."""
+    energies = np.empty(len(rectangles))
+    for i in range(len(rectangles)):
+        energies[i] = own_energy(small, large, rectangles[i], model)
+    return energies
 
 
 @njit(cache=True, nogil=True)

@@ -8,18 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import HIGH, Cells
+from .cells import HIGH
 from .rectangles import to_world
+from .tables import MILLI
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from .preparation import Prepared
+
 __all__ = ["draw_convergence", "draw_evidence", "draw_heights", "draw_rectangles"]
 
 
-def _extent(cells: Cells) -> tuple[float, float, float, float]:
-    west, south, east, north = cells.grid.extent
+def _extent(prepared: Prepared) -> tuple[float, float, float, float]:
+    west, south, east, north = prepared.grid.extent
     return west, east, south, north
 
 
@@ -31,43 +34,46 @@ def _finish(axes: Axes) -> None:
     axes.set_ylabel("north (m)", fontsize=8)
 
 
-def _shade(cells: Cells, axes: Axes) -> None:
-    metres = np.where(cells.state == HIGH, 0.01 * cells.height, 0.0)
-    south, east = np.gradient(metres, cells.grid.gsd) if min(metres.shape) > 1 else (metres, metres)
-    axes.imshow(np.clip(0.75 + 0.18 * (east - south), 0, 1), cmap="gray", vmin=0, vmax=1, extent=_extent(cells))
+def _shade(prepared: Prepared, axes: Axes) -> None:
+    metres = np.where(prepared.state == HIGH, 0.01 * prepared.height, 0.0)
+    south, east = np.gradient(metres, prepared.grid.gsd) if min(metres.shape) > 1 else (metres, metres)
+    axes.imshow(np.clip(0.75 + 0.18 * (east - south), 0, 1), cmap="gray", vmin=0, vmax=1, extent=_extent(prepared))
 
 
-def draw_heights(cells: Cells, figure: Figure) -> None:
+def draw_heights(prepared: Prepared, figure: Figure) -> None:
     """Draw the heights above ground of high cells over a shaded relief."""
     axes = figure.add_subplot()
-    _shade(cells, axes)
-    metres = np.ma.masked_where(cells.state != HIGH, 0.01 * cells.height)
+    _shade(prepared, axes)
+    metres = np.ma.masked_where(prepared.state != HIGH, 0.01 * prepared.height)
     top = float(np.percentile(metres.compressed(), 99)) if metres.count() else 1.0
-    image = axes.imshow(metres, cmap="viridis", alpha=0.6, vmin=0, vmax=max(top, 1.0), extent=_extent(cells))
+    image = axes.imshow(metres, cmap="viridis", alpha=0.6, vmin=0, vmax=max(top, 1.0), extent=_extent(prepared))
     figure.colorbar(image, ax=axes, shrink=0.7, label="height above ground (m)")
     _finish(axes)
 
 
-def draw_evidence(cells: Cells, score: NDArray[np.float32], figure: Figure) -> None:
+def draw_evidence(prepared: Prepared, figure: Figure) -> None:
     """Draw the score of each cell: blue speaks for a roof, red against it."""
     axes = figure.add_subplot()
-    image = axes.imshow(score, cmap="RdBu", vmin=-4, vmax=4, extent=_extent(cells), interpolation="nearest")
+    nats, place = prepared.score / MILLI, _extent(prepared)
+    image = axes.imshow(nats, cmap="RdBu", vmin=-4, vmax=4, extent=place, interpolation="nearest")
     figure.colorbar(image, ax=axes, shrink=0.7, label="score (nats per m²)")
     _finish(axes)
 
 
-def draw_rectangles(cells: Cells, rectangles: NDArray[np.float64], figure: Figure, *, colour: str = "crimson") -> None:
+def draw_rectangles(
+    prepared: Prepared, rectangles: NDArray[np.float64], figure: Figure, *, colour: str = "crimson"
+) -> None:
     """Draw rectangles over the shaded relief."""
     from matplotlib.collections import PolyCollection
 
     axes = figure.add_subplot()
-    _shade(cells, axes)
+    _shade(prepared, axes)
     if len(rectangles):
         outlines = PolyCollection(
-            list(to_world(rectangles, cells.grid)), facecolors="none", edgecolors=colour, linewidths=0.8
+            list(to_world(rectangles, prepared.grid)), facecolors="none", edgecolors=colour, linewidths=0.8
         )
         axes.add_collection(outlines)
-    west, east, south, north = _extent(cells)
+    west, east, south, north = _extent(prepared)
     axes.set_xlim(west, east)
     axes.set_ylim(south, north)
     _finish(axes)

@@ -11,14 +11,68 @@ rectangle when its centre does; the share of matching points is that of a Gaussi
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from .random_stream import gaussian, integer, uniform
+from ...scenes.points import PointCloud
+from .cells import HIGH
+from .preparation import Prepared
+from .random_stream import gaussian, integer, stream, uniform
 from .rectangles import row_span
 
-__all__ = ["run_printed"]
+if TYPE_CHECKING:
+    from .detector import MPP
+
+__all__ = ["run_printed", "sample_printed"]
+
+_TRACE = ("proposals", "temperature", "energy", "buildings")
+
+
+def sample_printed(
+    parameters: MPP, prepared: Prepared, points: PointCloud, seed: int
+) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    """Run the printed algorithm on elevations; the Gaussians of ground and trees come from low and rough cells.
+
+    Returns
+    -------
+    rectangles : ndarray, shape (n, 5)
+    trace : dict
+        Columns of `run_printed`; p_f stands where the temperature does.
+    """
+    grid, cell = prepared.grid, prepared.grid.gsd
+    index, inside = grid.cells(points.x, points.y)
+    inside &= np.isfinite(points.z)
+    index, z = index[inside], points.z[inside]
+    base = float(np.median(z)) if len(z) else 0.0
+    z = z - base
+    sums = [np.bincount(index, weights=z**k, minlength=grid.rows * grid.columns) for k in range(3)]
+    table = np.stack(sums, axis=-1).reshape(*grid.shape, 3)
+    high = (prepared.state == HIGH).ravel()[index]
+    rough = (prepared.score < 0).ravel()[index] & high
+    roof = high & ~rough
+    classes = np.array([_normal(z[~high]), _normal(z[rough] if rough.any() else z)])
+    height = _normal(z[roof] if roof.any() else z)
+    found, trace = run_printed(
+        table,
+        classes,
+        np.array([(15 / cell, 6 / cell), (10 / cell, 4 / cell), height, (0.5, 0.25)]),
+        np.array([1.0 / cell, 1.0 / cell, 0.1, 0.5, 0.1]),
+        np.array([parameters.least_side / cell, parameters.largest_side / cell]),
+        stream([seed]),
+        parameters.iterations,
+        parameters.false_alarm_ratio,
+        5000,
+        max(parameters.iterations // 100, 1),
+    )
+    return np.ascontiguousarray(found[:, :5]), {name: trace[:, k].tolist() for k, name in enumerate(_TRACE)}
+
+
+def _normal(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Return mean and standard deviation, the latter at least 10 cm."""
+    return float(values.mean()), max(float(values.std()), 0.1)
 
 
 @njit(cache=True, nogil=True)

@@ -25,6 +25,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .workers import ALONE, Workers
+
 __all__ = ["LONGEST", "MILLI", "TALLEST", "Tables", "make_tables", "part_sums"]
 
 #: Steps of the score per nat.
@@ -46,7 +48,9 @@ class Tables:
         return self.small.shape[0], self.small.shape[1] - 1
 
 
-def make_tables(height: NDArray[np.int32], high: NDArray[np.bool_], score: NDArray[np.float32]) -> Tables:
+def make_tables(
+    height: NDArray[np.int32], high: NDArray[np.bool_], score: NDArray[np.int16], *, workers: Workers = ALONE
+) -> Tables:
     """Sum up the rows.
 
     Parameters
@@ -54,13 +58,14 @@ def make_tables(height: NDArray[np.int32], high: NDArray[np.bool_], score: NDArr
     height : ndarray of int32, shape (rows, columns)
         Centimetres; read where `high`.
     high : ndarray of bool, shape (rows, columns)
-    score : ndarray of float32, shape (rows, columns)
-        Nats.
+    score : ndarray of int16, shape (rows, columns)
+        Thousandths of a nat.
+    workers : Workers
     """
     rows, columns = height.shape
     large = np.zeros((rows, columns + 1, 4), dtype=np.int64)
     small = large.view(np.int32)
-    _sum_rows(height, high, score, small, large)
+    workers.bands(lambda first, last: _sum_rows(height, high, score, first, last, small, large), rows)
     return Tables(small, large)
 
 
@@ -84,9 +89,9 @@ def part_sums(small, large, row, first, last, x0):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True)
-def _sum_rows(height, high, score, small, large):  # type: ignore[no-untyped-def]
-    rows, columns = height.shape
-    for r in range(rows):
+def _sum_rows(height, high, score, first, last, small, large):  # type: ignore[no-untyped-def]
+    columns = height.shape[1]
+    for r in range(first, last):
         zero = np.int64(0)
         n, x, h, milli, xx, xh, hh = 0, 0, zero, 0, 0, zero, zero
         for c in range(columns):
@@ -98,7 +103,7 @@ def _sum_rows(height, high, score, small, large):  # type: ignore[no-untyped-def
                 xx += c * c
                 xh += c * level
                 hh += level * level
-            milli += round(score[r, c] * MILLI)
+            milli += score[r, c]
             small[r, c + 1, 0], small[r, c + 1, 1], small[r, c + 1, 2] = n, np.int32(x), np.int32(h)
             small[r, c + 1, 3], small[r, c + 1, 4], small[r, c + 1, 5] = np.int32(milli), np.int32(xx), np.int32(xh)
             large[r, c + 1, 3] = hh

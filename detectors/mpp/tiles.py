@@ -19,13 +19,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...scenes.raster import Grid
+from .workers import ALONE, Workers
 
 __all__ = ["Tile", "tiles_of", "work_off"]
 
@@ -107,7 +107,7 @@ def work_off(
     job: Callable[[Tile, _Rectangles, _Rectangles], _Rectangles],
     *,
     reach: float,
-    workers: Executor | None = None,
+    workers: Workers = ALONE,
 ) -> _Rectangles:
     """Run a job per tile, colour by colour, and return all rectangles.
 
@@ -120,8 +120,7 @@ def work_off(
         ``job(tile, own, fixed)`` returns the tile's new rectangles, centred in it.
     reach : float
         Width of the halo, cells; less than a tile, so that tiles of one colour are independent.
-    workers : Executor, optional
-        Threads.
+    workers : Workers
     """
     held = start
     for colour in range(4):
@@ -131,7 +130,7 @@ def work_off(
         def run(tile: Tile, before: _Rectangles = before) -> _Rectangles:
             return job(tile, before[tile.owns(before)], before[tile.sees(before, reach)])
 
-        found = list(workers.map(run, batch)) if workers else [run(tile) for tile in batch]
+        found = workers.map(run, batch)
         kept = np.ones(len(held), dtype=bool)
         for tile in batch:
             kept &= ~tile.owns(held)

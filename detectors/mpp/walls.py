@@ -48,29 +48,43 @@ def close_walls(small, large, model, rectangles, tolerance):  # type: ignore[no-
         How much the energy of a building by itself may rise with one edge.
     """
     new = np.empty(5)
-    count = len(rectangles)
-    for i in range(count):
+    others = np.empty_like(rectangles)
+    for i in range(len(rectangles)):
+        count = _neighbours(rectangles, i, others)
         for edge in range(4):
-            if overlaps(rectangles, count, rectangles[i], i, -1) > _CONTACT:
-                _back(small, large, model, rectangles, i, edge, tolerance, new)
+            if overlaps(others, count, rectangles[i], -1, -1) > _CONTACT:
+                _back(small, large, model, rectangles, i, others[:count], edge, tolerance, new)
         for edge in range(4):
-            _out(small, large, model, rectangles, i, edge, tolerance, new)
+            _out(small, large, model, rectangles, i, others[:count], edge, tolerance, new)
 
 
 @njit(cache=True, nogil=True)
-def _back(small, large, model, rectangles, i, edge, tolerance, new):  # type: ignore[no-untyped-def]
+def _neighbours(rectangles, i, others):  # type: ignore[no-untyped-def]
+    """Fill `others` with the buildings that building i can meet when its edges move; return their number."""
+    count = 0
+    reach = 0.5 * math.hypot(rectangles[i, 2], rectangles[i, 3]) + 4.0 * _REACH
+    for j in range(len(rectangles)):
+        dx, dy = rectangles[j, 0] - rectangles[i, 0], rectangles[j, 1] - rectangles[i, 1]
+        far = reach + 0.5 * (rectangles[j, 2] + rectangles[j, 3])
+        if j != i and dx * dx + dy * dy < far * far:
+            others[count] = rectangles[j]
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _back(small, large, model, rectangles, i, others, edge, tolerance, new):  # type: ignore[no-untyped-def]
     """Move an edge back where that takes away most of the common area within reach."""
-    count = len(rectangles)
-    shared = overlaps(rectangles, count, rectangles[i], i, -1)
+    shared = overlaps(others, len(others), rectangles[i], -1, -1)
     _moved(rectangles[i], edge, -_REACH, new)
-    if new[2 + edge // 2] < model.least_side or overlaps(rectangles, count, new, i, -1) > 0.5 * shared:
+    if new[2 + edge // 2] < model.least_side or overlaps(others, len(others), new, -1, -1) > 0.5 * shared:
         return
-    least = overlaps(rectangles, count, new, i, -1) + _CONTACT
+    least = overlaps(others, len(others), new, -1, -1) + _CONTACT
     near, far = 0.0, _REACH
     for _ in range(_HALVINGS + 3):
         middle = 0.5 * (near + far)
         _moved(rectangles[i], edge, -middle, new)
-        if overlaps(rectangles, count, new, i, -1) > least:
+        if overlaps(others, len(others), new, -1, -1) > least:
             near = middle
         else:
             far = middle
@@ -81,25 +95,24 @@ def _back(small, large, model, rectangles, i, edge, tolerance, new):  # type: ig
 
 
 @njit(cache=True, nogil=True)
-def _out(small, large, model, rectangles, i, edge, tolerance, new):  # type: ignore[no-untyped-def]
+def _out(small, large, model, rectangles, i, others, edge, tolerance, new):  # type: ignore[no-untyped-def]
     """Move an edge out to the first contact within reach."""
-    count = len(rectangles)
-    base = overlaps(rectangles, count, rectangles[i], i, -1)
+    base = overlaps(others, len(others), rectangles[i], -1, -1)
     _moved(rectangles[i], edge, _REACH, new)
-    if new[2 + edge // 2] > model.largest_side or overlaps(rectangles, count, new, i, -1) <= base + _CONTACT:
+    if new[2 + edge // 2] > model.largest_side or overlaps(others, len(others), new, -1, -1) <= base + _CONTACT:
         return
     near, far = 0.0, _REACH
     for step in range(1, _STEPS + 1):
         by = _REACH * step / _STEPS
         _moved(rectangles[i], edge, by, new)
-        if overlaps(rectangles, count, new, i, -1) > base + _CONTACT:
+        if overlaps(others, len(others), new, -1, -1) > base + _CONTACT:
             far = by
             break
         near = by
     for _ in range(_HALVINGS):
         middle = 0.5 * (near + far)
         _moved(rectangles[i], edge, middle, new)
-        if overlaps(rectangles, count, new, i, -1) > base + _CONTACT:
+        if overlaps(others, len(others), new, -1, -1) > base + _CONTACT:
             far = middle
         else:
             near = middle

@@ -56,7 +56,7 @@ def houses():
     high = height > 0
     rng = np.random.default_rng(0)
     height[high] += rng.integers(-15, 16, high.sum())
-    return make_tables(height, high, np.where(high, 3.0, -3.0).astype(np.float32))
+    return make_tables(height, high, np.where(high, 3000, -3000).astype(np.int16))
 
 
 def chain(tables, births, proposals, seed=0, start=NONE, hot=1.0, cold=1.0, intensity=3 / 1600, stride=50, **more):

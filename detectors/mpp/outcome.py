@@ -1,0 +1,71 @@
+"""The result of a run as footprints: a rectangle each, or blocks of touching rectangles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...scenes.footprints import Footprints
+from .energy import ground_variance
+from .preparation import Prepared
+from .rectangles import to_world
+from .roofs import KINDS, fit_roof
+
+__all__ = ["as_blocks", "as_rectangles"]
+
+
+def as_rectangles(
+    prepared: Prepared,
+    rectangles: NDArray[np.float64],
+    energies: NDArray[np.float64],
+    *,
+    crs: str | None,
+    record: dict[str, Any],
+    source: str,
+) -> Footprints:
+    """Return one footprint a rectangle, with the attributes height, tau, slope (m, m, m/m), roof and energy."""
+    tables, model = prepared.tables, prepared.model
+    share = model.weight * model.fit_weight
+    price = model.roof_price / share if share > 0 else math.inf
+    fits = np.zeros((len(rectangles), 5))
+    for rectangle, fit in zip(rectangles, fits, strict=True):
+        explained = ground_variance(rectangle, model)
+        fit_roof(
+            tables.small,
+            tables.large,
+            rectangle,
+            price,
+            model.least_tau,
+            explained,
+            model.least_height,
+            model.cell,
+            fit,
+        )
+    return Footprints.from_rectangles(
+        to_world(rectangles, prepared.grid),
+        crs=crs,
+        attributes={
+            "height": fits[:, 1],
+            "tau": fits[:, 2],
+            "slope": fits[:, 4],
+            "roof": np.array([KINDS[int(kind)] for kind in fits[:, 3]], dtype=str),
+            "energy": energies,
+        },
+        metadata=record,
+        source=source,
+    )
+
+
+def as_blocks(
+    prepared: Prepared, rectangles: NDArray[np.float64], *, crs: str | None, record: dict[str, Any], source: str
+) -> Footprints:
+    """Return the union of rectangles that touch, or stand less than half a cell apart."""
+    gap = 0.5 * prepared.grid.gsd
+    polygons = Footprints.from_rectangles(to_world(rectangles, prepared.grid)).polygons
+    wide = shapely.buffer(polygons, gap / 2, join_style="mitre")
+    union = shapely.buffer(shapely.union_all(wide), -gap / 2, join_style="mitre")
+    return Footprints.of(shapely.get_parts(union), crs=crs, metadata=record, source=source)

@@ -1,0 +1,149 @@
+"""From the cloud to what the sampler reads: cells, classes, tables and boxes.
+
+At 40 bytes a cell the tables and what they are made of are the most that is held at once; arrays are let go as soon as
+they have served.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scenes.errors import ParameterError
+from ...scenes.ground import fill_unknown, ground_surface
+from ...scenes.points import PointCloud
+from ...scenes.raster import Elevation, Grid
+from ...scenes.scene import Scene
+from .background import Background, estimate_background, score_cells, textures
+from .candidates import propose_boxes
+from .cells import Cells, cell_size, make_cells
+from .energy import Model, own_energies
+from .superstructures import lower_superstructures
+from .tables import LONGEST, Tables, make_tables
+from .workers import Workers
+
+if TYPE_CHECKING:
+    from .detector import MPP
+
+__all__ = ["Prepared", "prepare"]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What the sampler reads, and what the figures show of it.
+
+    Attributes
+    ----------
+    grid : Grid
+        Of the cells.
+    height : ndarray of int32, shape (rows, columns)
+        Centimetres above ground of high cells.
+    state : ndarray of uint8, shape (rows, columns)
+        See `cells`.
+    score : ndarray of int16, shape (rows, columns)
+        Thousandths of a nat.
+    background : Background
+    tables : Tables
+    model : Model
+    boxes : ndarray, shape (n, 5)
+        Best first.
+    weights : ndarray, shape (n,)
+    """
+
+    grid: Grid
+    height: NDArray[np.int32]
+    state: NDArray[np.uint8]
+    score: NDArray[np.int16]
+    background: Background
+    tables: Tables
+    model: Model
+    boxes: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+
+def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers) -> Prepared:
+    """Turn the cloud into cells, classes, tables and boxes."""
+    cell = parameters.cell or cell_size(points.x, points.y, scene.extent)
+    if math.sqrt(2) * parameters.largest_side > LONGEST * cell:
+        raise ParameterError(
+            f"mpp: largest_side of {parameters.largest_side:g} m is too long for cells of {cell:g} m; a rectangle must "
+            f"not reach over more than {LONGEST} cells: lower it to {math.floor(LONGEST * cell / math.sqrt(2))}, "
+            f"or raise cell"
+        )
+    background, height, state, score, fitted = _classes(parameters, points, scene, cell, workers)
+    boxes, weights = np.empty((0, 5)), np.empty(0)
+    tables = make_tables(height, fitted, score, workers=workers)
+    model = _model(parameters, cell)
+    if parameters.data_births > 0 or parameters.start == "greedy":
+        least = math.ceil(6 / cell**2)
+        boxes = propose_boxes(height, fitted, steps=(0.4, 1.0, 1000.0), least_cells=least, workers=workers)
+        energies = own_energies(tables.small, tables.large, boxes, model)
+        order = np.argsort(energies, kind="stable")
+        boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
+    grid = Grid.covering(scene.extent, cell)
+    return Prepared(grid, height, state, score, background, tables, model, boxes, weights)
+
+
+def _classes(
+    parameters: MPP, points: PointCloud, scene: Scene, cell: float, workers: Workers
+) -> tuple[Background, NDArray[np.int32], NDArray[np.uint8], NDArray[np.int16], NDArray[np.bool_]]:
+    """Return the classes of the scene, and height, state, score and whether it is fitted of each cell."""
+    if scene.dem is not None:
+        ground = Elevation(fill_unknown(scene.dem.values), scene.dem.grid)
+    else:
+        ground = ground_surface(points, scene.extent)
+    low = 0.8 * parameters.least_height
+    cells = make_cells(points, ground, Grid.covering(scene.extent, cell), low=low, workers=workers)
+    background, bins = estimate_background(cells, workers=workers)
+    score, fitted = _scored(parameters, cells, bins, background, workers)
+    if parameters.carried_share <= 1:
+        height, state = lower_superstructures(
+            cells.height,
+            cells.state,
+            fitted,
+            step=parameters.roof_step,
+            share=parameters.carried_share,
+            most=int(parameters.furniture / cell**2),
+        )
+        cells = replace(cells, height=height, state=state)
+        bins = textures(cells.height, cells.state, cells.openness, workers=workers)
+        score, fitted = _scored(parameters, cells, bins, background, workers)
+    return background, cells.height, cells.state, score, fitted
+
+
+def _scored(
+    parameters: MPP, cells: Cells, bins: NDArray[np.int16], background: Background, workers: Workers
+) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
+    return score_cells(
+        cells,
+        bins,
+        background,
+        fit_weight=parameters.fit_weight,
+        texture_weight=parameters.texture_weight,
+        texture_limit=parameters.texture_limit,
+        low_price=parameters.low_price,
+        void_price=parameters.void_price,
+        workers=workers,
+    )
+
+
+def _model(parameters: MPP, cell: float) -> Model:
+    """Return the constants of the energy in units of cells."""
+    return Model(
+        weight=cell * cell,
+        price=parameters.price,
+        overlap=parameters.overlap * cell * cell,
+        roof_price=parameters.roof_price if parameters.roofs == "all" else math.inf,
+        least_tau=parameters.least_tau,
+        least_height=parameters.least_height,
+        cell=cell,
+        void_price=parameters.void_price,
+        least_side=parameters.least_side / cell,
+        largest_side=parameters.largest_side / cell,
+        fit_weight=parameters.fit_weight,
+        ground_error=parameters.ground_error,
+    )
