@@ -32,6 +32,7 @@ from ..scenes.scene import Scene
 from .base import Detector, Step
 from .cues import CellCues, cell_cues, greenness
 from .heights import ground_of, heights_above_ground
+from .morphology import opened, without_holes
 from .outlines import coverage_of_mask, minimum_rectangles, trace
 from .regularise import regularise
 
@@ -183,15 +184,7 @@ class NDSM(Detector):
 
     def _clean(self, roof: _Mask, cell: float) -> _Mask:
         """Fill small holes and open."""
-        import cv2
-
-        mask = roof.astype(np.uint8)
-        _, labels, statistics, _ = cv2.connectedComponentsWithStats(1 - mask, connectivity=4)
-        small = statistics[:, cv2.CC_STAT_AREA] * cell**2 <= self.largest_hole
-        small[0] = False
-        mask[small[labels]] = 1
-        opened = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(self.opening / cell))
-        return _with_corners(opened, mask, 0.5 * self.opening / cell)
+        return opened(without_holes(roof, self.largest_hole / cell**2), self.opening / cell)
 
     def _footprints(
         self, traced: NDArray[np.object_], cues: CellCues, likeness: _Floats, crs: str | None
@@ -274,34 +267,6 @@ def _averaged(likeness: _Floats, high: _Mask, sigma: float) -> _Floats:
     total = cv2.GaussianBlur(np.where(told, likeness, np.float32(0)), (0, 0), sigma)
     weight = cv2.GaussianBlur(told.astype(np.float32), (0, 0), sigma)
     return np.where(told, total / np.where(told, weight, 1), likeness)
-
-
-def _disc(radius: float) -> NDArray[np.uint8]:
-    """Return a disc of a radius in cells; a single cell below three quarters."""
-    reach = int(radius + 0.25)
-    row, column = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    disc: NDArray[np.uint8] = (row**2 + column**2 <= max(radius, reach) ** 2 + 0.5).astype(np.uint8)
-    return disc
-
-
-def _with_corners(opened: NDArray[np.uint8], mask: NDArray[np.uint8], radius: float) -> _Mask:
-    """Return the opened mask with what the mask has within a radius of it, but no region joined to another.
-
-    A disc of radius r leaves a square corner bare over 0.41 r.
-    """
-    import cv2
-
-    count, labels = cv2.connectedComponents(opened, connectivity=4)
-    label = labels.astype(np.float32)
-    window = _disc(radius)
-    highest = cv2.dilate(label, window)
-    lowest = cv2.erode(np.where(label > 0, label, np.float32(count)), window)
-    restored = (opened > 0) | ((mask > 0) & (highest == lowest))
-    # Restored cells of two regions may still touch.
-    owner = np.where(restored, np.maximum(highest, label), np.float32(0))
-    ring = np.ones((3, 3), np.uint8)
-    apart = cv2.dilate(owner, ring) == cv2.erode(np.where(owner > 0, owner, np.float32(count)), ring)
-    return np.asarray((opened > 0) | (restored & apart))
 
 
 def _means_inside(polygons: NDArray[np.object_], grid: Grid, *rasters: _Floats) -> list[NDArray[np.float64]]:

@@ -77,7 +77,7 @@ class MPP(Detector):
         swept=(0, 0.005, 0.01),
     )
     outline: str = parameter(
-        "rectangles", choices=("rectangles", "blocks"), doc="one footprint a rectangle, or one a block of touching ones"
+        "rectangles", choices=("rectangles", "blocks"), doc="one rectangle a house or wing, or one polygon a block"
     )
     roofs: str = parameter("all", choices=("all", "flat"), doc="plane, gable and hip roofs besides flat ones, or not")
     roof_step: float = parameter(1.0, unit="m", minimum=0.1, doc="step between neighbouring cells that parts two roofs")

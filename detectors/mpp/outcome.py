@@ -1,4 +1,4 @@
-"""The result of a run as footprints: a rectangle each, or blocks of touching rectangles."""
+"""The result of a run as footprints: a rectangle each, or blocks of all that is built together."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from ...scenes.footprints import Footprints
+from .blocks import outline_blocks
 from .energy import ground_variance
 from .preparation import Prepared
 from .rectangles import to_world
@@ -63,9 +63,6 @@ def as_rectangles(
 def as_blocks(
     prepared: Prepared, rectangles: NDArray[np.float64], *, crs: str | None, record: dict[str, Any], source: str
 ) -> Footprints:
-    """Return the union of rectangles that touch, or stand less than half a cell apart."""
-    gap = 0.5 * prepared.grid.gsd
-    polygons = Footprints.from_rectangles(to_world(rectangles, prepared.grid)).polygons
-    wide = shapely.buffer(polygons, gap / 2, join_style="mitre")
-    union = shapely.buffer(shapely.union_all(wide), -gap / 2, join_style="mitre")
-    return Footprints.of(shapely.get_parts(union), crs=crs, metadata=record, source=source)
+    """Return one footprint a block that the rectangles belong to, outlined along its cells (`blocks`)."""
+    polygons = outline_blocks(rectangles, prepared.grid, prepared.state, prepared.score)
+    return Footprints.of(polygons, crs=crs, metadata=record, source=source)

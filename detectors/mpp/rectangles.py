@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...scenes.raster import Grid
 
-__all__ = ["corners", "overlap_area", "row_span", "to_grid_frame", "to_world"]
+__all__ = ["corners", "inside_any", "overlap_area", "row_span", "to_grid_frame", "to_world"]
 
 
 def corners(rectangles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -119,3 +119,24 @@ def overlap_area(first, second):  # type: ignore[no-untyped-def]
         j = (i + 1) % n
         area += p[now, i, 0] * p[now, j, 1] - p[now, j, 0] * p[now, i, 1]
     return 0.5 * abs(area)
+
+
+def inside_any(rectangles: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return which cells of a grid of this shape have their centre inside one of the rectangles, shape (n, 5)."""
+    mask = np.zeros(shape, dtype=np.bool_)
+    _fill(np.ascontiguousarray(rectangles, dtype=np.float64), mask)
+    return mask
+
+
+@njit(cache=True, nogil=True)
+def _fill(rectangles, mask):  # type: ignore[no-untyped-def]
+    rows, columns = mask.shape
+    for k in range(len(rectangles)):
+        cx, cy, half_a, half_b = rectangles[k, 0], rectangles[k, 1], 0.5 * rectangles[k, 2], 0.5 * rectangles[k, 3]
+        cos, sin = math.cos(rectangles[k, 4]), math.sin(rectangles[k, 4])
+        tall = half_a * abs(sin) + half_b * abs(cos)
+        for r in range(max(math.floor(cy - tall), 0), min(math.ceil(cy + tall), rows)):
+            lo, hi = row_span(r + 0.5 - cy, half_a, half_b, cos, sin)
+            if lo < hi:
+                first, last = math.ceil(cx + lo - 0.5), math.floor(cx + hi + 0.5)
+                mask[r, max(first, 0) : max(min(last, columns), 0)] = True

@@ -1,0 +1,57 @@
+"""Morphology: cleaning of masks on a grid. All lengths are in cells."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["opened", "without_holes"]
+
+_Mask = NDArray[np.bool_]
+
+
+def without_holes(mask: _Mask, largest: float) -> _Mask:
+    """Return the mask with its holes of up to `largest` cells filled."""
+    import cv2
+
+    solid = mask.astype(np.uint8)
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=4)
+    small = statistics[:, cv2.CC_STAT_AREA] <= largest
+    small[0] = False
+    return np.asarray((solid > 0) | small[labels])
+
+
+def opened(mask: _Mask, radius: float) -> _Mask:
+    """Return the mask without what a disc of a radius does not fit into, square corners kept."""
+    import cv2
+
+    solid = mask.astype(np.uint8)
+    return _with_corners(cv2.morphologyEx(solid, cv2.MORPH_OPEN, _disc(radius)), solid, 0.5 * radius)
+
+
+def _disc(radius: float) -> NDArray[np.uint8]:
+    """Return a disc of a radius in cells; a single cell below three quarters."""
+    reach = int(radius + 0.25)
+    row, column = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    disc: NDArray[np.uint8] = (row**2 + column**2 <= max(radius, reach) ** 2 + 0.5).astype(np.uint8)
+    return disc
+
+
+def _with_corners(opened: NDArray[np.uint8], mask: NDArray[np.uint8], radius: float) -> _Mask:
+    """Return the opened mask with what the mask has within a radius of it, but no region joined to another.
+
+    A disc of radius r leaves a square corner bare over 0.41 r.
+    """
+    import cv2
+
+    count, labels = cv2.connectedComponents(opened, connectivity=4)
+    label = labels.astype(np.float32)
+    window = _disc(radius)
+    highest = cv2.dilate(label, window)
+    lowest = cv2.erode(np.where(label > 0, label, np.float32(count)), window)
+    restored = (opened > 0) | ((mask > 0) & (highest == lowest))
+    # Restored cells of two regions may still touch.
+    owner = np.where(restored, np.maximum(highest, label), np.float32(0))
+    ring = np.ones((3, 3), np.uint8)
+    apart = cv2.dilate(owner, ring) == cv2.erode(np.where(owner > 0, owner, np.float32(count)), ring)
+    return np.asarray((opened > 0) | (restored & apart))

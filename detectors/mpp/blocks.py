@@ -1,0 +1,68 @@
+"""Blocks: one footprint for all that is built together; rectangles say where, cells say how far.
+
+Nouns
+-----
+evidence
+    Score (`background`) of the high cells around a high cell, summed up with the weights of a Gaussian.
+built
+    High cells with evidence for a roof, wherever they are, and all but low cells inside rectangles.
+block
+    Connected part of what is built, after small holes are filled and narrow parts between rectangles cut off, that lies
+    at least half inside rectangles. Its outline gets straight walls (`regularise`).
+
+A rectangle finds a house and places its party walls; an old block is no rectangle, and its cells know its edge better.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...scenes.raster import Grid
+from ..morphology import opened, without_holes
+from ..outlines import coverage_of_mask, trace
+from ..regularise import regularise
+from .cells import HIGH, LOW
+from .rectangles import inside_any
+
+__all__ = ["outline_blocks"]
+
+#: Metres: sigma of the mean of evidence, radius of the opening, least distance of points that are no wall.
+_SIGMA, _OPENING, _STRAIGHT = 0.75, 1.0, 0.5
+#: Square metres: largest hole that is filled, smallest block.
+_HOLE, _SMALLEST = 10.0, 5.0
+#: Share of a block that must lie inside rectangles.
+_CONFIRMED = 0.5
+
+
+def outline_blocks(
+    rectangles: NDArray[np.float64], grid: Grid, state: NDArray[np.uint8], score: NDArray[np.int16]
+) -> NDArray[np.object_]:
+    """Return the polygons, with courtyards as holes, of the blocks that rectangles, shape (n, 5), belong to.
+
+    Parameters
+    ----------
+    rectangles : ndarray, shape (n, 5)
+        Grid frame.
+    grid : Grid
+    state : ndarray of uint8, shape (rows, columns)
+        See `cells`.
+    score : ndarray of int16, shape (rows, columns)
+        See `background`.
+    """
+    import cv2
+
+    gsd = grid.gsd
+    inside = inside_any(rectangles, grid.shape)
+    high = state == HIGH
+    around = cv2.GaussianBlur(np.where(high, score, 0).astype(np.float32), (0, 0), _SIGMA / gsd)
+    roof = high & (around > 0)
+    sure = inside & (state != LOW)
+    built = opened(without_holes(roof | sure, _HOLE / gsd**2), _OPENING / gsd) | sure
+    _, labels = cv2.connectedComponents(built.astype(np.uint8), connectivity=4)
+    sizes = np.bincount(labels.ravel())
+    kept = np.bincount(labels.ravel(), weights=inside.ravel()) >= _CONFIRMED * sizes
+    kept[0] = False
+    polygons = regularise(trace(coverage_of_mask(kept[labels]), grid), max(gsd, _STRAIGHT))
+    return polygons[shapely.area(polygons) >= _SMALLEST]

@@ -1,0 +1,68 @@
+"""Blocks: what is built together is one footprint, along its cells."""
+
+import numpy as np
+import pytest
+import shapely
+
+from roofbench.detectors.mpp.blocks import outline_blocks
+from roofbench.detectors.mpp.cells import HIGH, LOW
+from roofbench.detectors.mpp.rectangles import corners, inside_any
+from roofbench.scenes.raster import Grid
+
+GRID = Grid.covering((0.0, 0.0, 60.0, 40.0), 0.5)
+
+
+def outlined(roofs, rectangles, crowns=()):
+    """Outline blocks where boxes (x0, y0, x1, y1), metres, are roofs or crowns."""
+    state, score = np.full(GRID.shape, LOW), np.full(GRID.shape, -3000, np.int16)
+    for boxes, value in ((roofs, 3000), (crowns, -2000)):
+        for x0, y0, x1, y1 in boxes:
+            place = np.s_[80 - round(2 * y1) : 80 - round(2 * y0), round(2 * x0) : round(2 * x1)]
+            state[place], score[place] = HIGH, value
+    placed = [((x0 + x1), 80 - (y0 + y1), 2 * (x1 - x0), 2 * (y1 - y0), 0.0) for x0, y0, x1, y1 in rectangles]
+    return outline_blocks(np.array(placed, dtype=float).reshape(-1, 5), GRID, state, score)
+
+
+def likeness(one, two):
+    return one.intersection(two).area / one.union(two).area
+
+
+def test_houses_that_touch_are_one_block_and_others_another():
+    houses = [(5, 5, 15, 15), (15, 5, 22, 17), (30, 5, 40, 15)]
+    found = outlined(houses, houses)
+    assert len(found) == 2
+    assert likeness(max(found, key=shapely.area), shapely.union_all([shapely.box(*b) for b in houses[:2]])) > 0.97
+
+
+def test_cells_say_how_far_a_block_goes_beyond_and_short_of_its_rectangles():
+    found = outlined([(5, 5, 20, 15), (20, 5, 24, 9)], [(5, 5, 19, 17)])
+    assert len(found) == 1
+    assert likeness(found[0], shapely.union(shapely.box(5, 5, 20, 15), shapely.box(20, 5, 24, 9))) > 0.95
+
+
+def test_what_no_rectangle_confirms_is_no_block_and_a_crown_beside_a_house_none_of_it():
+    found = outlined([(5, 5, 15, 15), (40, 20, 50, 30)], [(5, 5, 15, 15)], crowns=[(15, 5, 25, 15)])
+    assert len(found) == 1
+    assert likeness(found[0], shapely.box(5, 5, 15, 15)) > 0.93
+
+
+def test_a_courtyard_is_a_hole():
+    wings = [(5, 5, 30, 11), (5, 21, 30, 27), (5, 11, 11, 21), (24, 11, 30, 21)]
+    found = outlined(wings, wings)
+    assert len(found) == 1
+    assert len(found[0].interiors) == 1
+    assert found[0].area == pytest.approx(25 * 22 - 13 * 10, rel=0.03)
+
+
+def test_no_rectangle_no_block():
+    assert len(outlined([(5, 5, 15, 15)], [])) == 0
+
+
+def test_cells_inside_rectangles_are_those_whose_centre_is():
+    rng = np.random.default_rng(4)
+    rectangles = np.column_stack(
+        [rng.uniform(-5, 45, 12), rng.uniform(-5, 35, 12), rng.uniform(2, 20, (12, 2)), rng.uniform(0, 3, 12)]
+    )
+    y, x = np.mgrid[:30, :40] + 0.5
+    union = shapely.union_all(shapely.polygons(corners(rectangles)))
+    np.testing.assert_array_equal(inside_any(rectangles, (30, 40)), shapely.contains_xy(union, x, y))
