@@ -64,5 +64,6 @@ def outline_blocks(
     sizes = np.bincount(labels.ravel())
     kept = np.bincount(labels.ravel(), weights=inside.ravel()) >= _CONFIRMED * sizes
     kept[0] = False
-    polygons = regularise(trace(coverage_of_mask(kept[labels]), grid), max(gsd, _STRAIGHT))
-    return polygons[shapely.area(polygons) >= _SMALLEST]
+    polygons: NDArray[np.object_] = regularise(trace(coverage_of_mask(kept[labels]), grid), max(gsd, _STRAIGHT))
+    large: NDArray[np.bool_] = shapely.area(polygons) >= _SMALLEST
+    return polygons[large]
