@@ -64,6 +64,7 @@ def _streets(
     period, length, street, cross = pattern[0], pattern[1], pattern[2], pattern[3]
     line = np.empty((2, u.shape[1]))
     known, offset = 1 << 30, 0.0
+    lot, grass = -1, 0
     for r in range(codes.shape[0]):
         # Interpolated down once a row, then across for every cell.
         y = north - (r + 0.5) * gsd
@@ -102,7 +103,10 @@ def _streets(
             elif zone == FIELDS:
                 codes[r, c] = _field_code(block, row, along, across, pattern, key)
             else:
-                codes[r, c] = _parcel_code(block, row, along, across, pattern, key, zone, dryness)
+                number = _parcel_number(block, row, along, across, pattern, zone)
+                if number != lot:
+                    lot, grass = number, _parcel_code(number, key, zone, dryness)
+                codes[r, c] = grass
 
 
 @njit(cache=True)
@@ -119,10 +123,8 @@ def _street_code(main: float, street: float, side: float, cross: float, zone: in
 
 
 @njit(cache=True)
-def _parcel_code(
-    block: int, row: int, along: float, across: float, pattern: NDArray[np.float64], key: int, zone: int, dryness: float
-) -> int:
-    """Grass of a parcel, drier on some; earth on a few."""
+def _parcel_number(block: int, row: int, along: float, across: float, pattern: NDArray[np.float64], zone: int) -> int:
+    """Return a number of the parcel that no other parcel near has; a park is one parcel."""
     usable = pattern[1] - pattern[3]
     wide = pattern[7] * (HALL_WIDTH if zone == HALLS else 1.0)
     count = max(1, round(usable / wide))
@@ -130,8 +132,13 @@ def _parcel_code(
     half = 0 if across < pattern[0] / 2 or zone == HALLS else 1
     if zone == PARK:
         lot, half = 0, 0
-    counter = ((block & 0xFFFF) << 32) | ((row & 0xFFFF) << 16) | ((lot & 0xFF) << 1) | half
-    draw, bare = uniform(key, counter), uniform(key, counter + (1 << 60))
+    return ((block & 0xFFFF) << 32) | ((row & 0xFFFF) << 16) | ((lot & 0xFF) << 1) | half
+
+
+@njit(cache=True)
+def _parcel_code(number: int, key: int, zone: int, dryness: float) -> int:
+    """Grass of a parcel, drier on some; earth on a few."""
+    draw, bare = uniform(key, number), uniform(key, number + (1 << 60))
     if bare < 0.05 and zone != PARK:
         return _EARTH
     dry = min(max(dryness + (draw - 0.5) * 0.9, 0.0), 1.0)

@@ -162,10 +162,10 @@ def _strip(
     count = 0
     for i in range(lines):
         # Aircraft and mirror speed vary slowly: lines and pulses crowd here and thin out there.
-        drift = 3.0 * math.sin(i * along_step / 37.0 + 6.0 * phase) / along_step + 0.12 * gauss(key, i)
+        drift = 5.5 * math.sin(i * along_step / 37.0 + 6.0 * phase) / along_step + 0.12 * gauss(key, i)
         for k in range(dots):
             counter = (i * dots + k) * 2 + (1 << 40)
-            crowding = 2.0 * math.sin((low + k * across_step) / 29.0 + 9.0 * phase)
+            crowding = 3.2 * math.sin((low + k * across_step) / 29.0 + 9.0 * phase)
             q = low + crowding + (k + 0.5 * (i & 1) + phase + 0.40 * gauss(key, counter)) * across_step
             p = -reach + (i + drift + 0.36 * gauss(key, counter + 1)) * along_step
             if q >= high:

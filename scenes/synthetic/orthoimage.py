@@ -249,34 +249,43 @@ def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float
     bands, rows, columns = values.shape
     out = np.empty_like(values)
     half = len(kernel) - 1
-    line = np.empty((1, columns), dtype=np.float32)
+    line = np.empty(columns, dtype=np.float32)
     # Each row of each band reads the same long strip of noise from a place of its own.
     grain = np.empty(_NOISE, dtype=np.float32)
     for k in range(_NOISE):
         grain[k] = noise * 255.0 * gauss(key, k)
     ring = np.empty((2 * half + 1, columns), dtype=np.float32)
+    padded = np.empty(columns + 2 * half, dtype=np.float32)
     for b in range(bands):
         for r in range(-half, rows + half):
-            source = min(max(r, 0), rows - 1)
-            target = ring[(r + half) % (2 * half + 1)]
+            source = values[b, min(max(r, 0), rows - 1)]
+            padded[:half], padded[half + columns :] = source[0], source[-1]
             for c in range(columns):
-                total = kernel[0] * values[b, source, c]
-                for t in range(1, half + 1):
-                    left, right = max(c - t, 0), min(c + t, columns - 1)
-                    total += kernel[t] * (np.float32(values[b, source, left]) + np.float32(values[b, source, right]))
-                target[c] = total
+                padded[half + c] = source[c]
+            _weighted(ring[(r + half) % (2 * half + 1)], padded[half:], kernel[0])
+            for t in range(1, half + 1):
+                _add_pair(ring[(r + half) % (2 * half + 1)], padded[half - t :], padded[half + t :], kernel[t])
             centre = r - half
             if centre < 0:
                 continue
-            for c in range(columns):
-                total = kernel[0] * ring[(centre + half) % (2 * half + 1), c]
-                for t in range(1, half + 1):
-                    total += kernel[t] * (
-                        ring[(centre - t + half) % (2 * half + 1), c] + ring[(centre + t + half) % (2 * half + 1), c]
-                    )
-                line[0, c] = total
+            _weighted(line, ring[(centre + half) % (2 * half + 1)], kernel[0])
+            for t in range(1, half + 1):
+                before, after = (centre - t + half) % (2 * half + 1), (centre + t + half) % (2 * half + 1)
+                _add_pair(line, ring[before], ring[after], kernel[t])
             start = int(uniform(key, (1 << 40) + b * rows + centre) * _NOISE)
             for c in range(columns):
-                value = line[0, c] + grain[(start + c) & (_NOISE - 1)] + 0.5
-                out[b, centre, c] = int(min(max(value, 0.0), 255.0))
+                value = line[c] + grain[(start + c) & (_NOISE - 1)] + np.float32(0.5)
+                out[b, centre, c] = np.uint8(min(max(value, np.float32(0.0)), np.float32(255.0)))
     return out
+
+
+@njit(cache=True)
+def _weighted(out: NDArray[np.float32], values: NDArray[np.float32], weight: float) -> None:
+    for c in range(len(out)):
+        out[c] = weight * values[c]
+
+
+@njit(cache=True)
+def _add_pair(out: NDArray[np.float32], before: NDArray[np.float32], after: NDArray[np.float32], weight: float) -> None:
+    for c in range(len(out)):
+        out[c] += weight * (before[c] + after[c])
