@@ -6,6 +6,7 @@ of its axes, so evaluation and detection accept only projected systems in metres
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,19 @@ from .errors import CRSError
 if TYPE_CHECKING:
     from pyproj import CRS
 
-__all__ = ["common_crs", "crs_label", "crs_text", "parse_crs", "require_metric", "same_crs"]
+__all__ = [
+    "common_crs",
+    "crs_label",
+    "crs_text",
+    "named_crs",
+    "parse_crs",
+    "require_metric",
+    "same_crs",
+    "scale_warning",
+]
+
+#: Largest deviation of mapped from true areas that passes without a warning; national grids stay below a tenth of it.
+_AREA_TOLERANCE = 0.02
 
 
 @lru_cache(maxsize=64)
@@ -27,6 +40,11 @@ def parse_crs(text: str) -> CRS:
         return pyproj.CRS.from_user_input(text)
     except ProjError as error:
         raise CRSError(f"{text[:60]!r} is no coordinate reference system: write for instance EPSG:25832") from error
+
+
+def named_crs(text: str) -> str:
+    """Return what a person wrote as a CRS in the form that files keep: ``2154`` and ``epsg:2154`` as ``EPSG:2154``."""
+    return crs_text(parse_crs(text.strip()))
 
 
 @lru_cache(maxsize=64)
@@ -98,6 +116,26 @@ def require_metric(text: str | None, where: str, *, heights: bool = True, remedy
                     f"{where}: its heights are in {axis.unit_name} ({part.name}), metres are needed: "
                     f"{remedy or 'convert them'}"
                 )
+
+
+def scale_warning(text: str | None, x: float, y: float) -> str | None:
+    """Return in words that areas at a place are far from true ones, as in Web Mercator; None where they are not."""
+    if text is None:
+        return None
+    import pyproj
+    from pyproj.exceptions import ProjError
+
+    projection = pyproj.Proj(_horizontal(text))
+    try:
+        scale = projection.get_factors(*projection(x, y, inverse=True)).areal_scale
+    except ProjError:
+        return None  # outside the domain of the projection
+    if not math.isfinite(scale) or abs(scale - 1.0) <= _AREA_TOLERANCE:
+        return None
+    return (
+        f"warning: {crs_label(text)} shows areas {scale:.2f} and lengths {scale**0.5:.2f} times as large as they are "
+        "here: reproject to the national grid or a UTM zone"
+    )
 
 
 def same_crs(first: str, second: str) -> bool:

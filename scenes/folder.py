@@ -25,14 +25,15 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .errors import InputError
+from .crs import require_metric
+from .errors import CRSError, InputError
 from .footprints import Footprints
 from .output import whole_folder
 from .points import PointCloud
 from .raster import Elevation, Image
 from .scene import Scene
 
-__all__ = ["FILES", "MANIFEST", "changed_files", "open_scene", "read_manifest", "save_scene", "seal_scene"]
+__all__ = ["FILES", "HOLDS", "MANIFEST", "changed_files", "open_scene", "read_manifest", "save_scene", "seal_scene"]
 
 MANIFEST = "scene.toml"
 #: What a scene holds, and the file that holds it.
@@ -43,6 +44,8 @@ FILES: Mapping[str, str] = {
     "reference": "reference.gpkg",
     "area": "area.gpkg",
 }
+#: Names in a scene folder, with the side files that a GIS leaves: a folder with any other is not replaced.
+HOLDS = (MANIFEST, *FILES.values(), "*.aux.xml", "*.ovr", "*.qmd", "*.qml", "*.gpkg-wal", "*.gpkg-shm", "*.lax")
 #: Version of the layout; raised when a folder of before cannot be read any more.
 _FORMAT = 1
 
@@ -89,7 +92,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, overwrite: bool = 
     OutputError
         The folder exists (without `overwrite`) or cannot be written.
     """
-    with whole_folder(path, overwrite=overwrite) as folder:
+    with whole_folder(path, holds=HOLDS, overwrite=overwrite) as folder:
         if scene.points is not None:
             from .las_files import write_points
 
@@ -127,6 +130,11 @@ def read_manifest(path: str | os.PathLike[str]) -> tuple[Path, dict[str, Any]]:
     problem = _manifest_problem(manifest)
     if problem:
         raise InputError(f"{file}: {problem}")
+    try:
+        require_metric(manifest.get("crs"), str(file), remedy="write the CRS that its files are in")
+    except CRSError as error:
+        told = str(error)
+        raise CRSError(told if told.startswith(str(file)) else f"{file}: {told}") from error
     for kind in manifest.get("files", {}):
         if not (folder / FILES[kind]).is_file():
             raise InputError(

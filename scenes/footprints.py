@@ -30,6 +30,9 @@ from .vector_columns import labels_of
 
 __all__ = ["Footprints", "Repair", "polygonal_part"]
 
+#: Widest gap that is closed between footprints, metres: no two houses so far apart are one block.
+_WIDEST_GAP = 100.0
+
 #: Stands for "number the rows from 0".
 _UNNUMBERED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
@@ -193,8 +196,11 @@ class Footprints:
         >>> [round(area, 1) for area in row.joined(0.1).areas]
         [90.0, 45.0]
         """
-        if not 0 < gap < np.inf:
-            raise InputError(f"{self.source}: footprints are joined over gaps of a width of more than 0 m, not {gap:g}")
+        if not 0 < gap <= _WIDEST_GAP:
+            raise InputError(
+                f"{self.source}: footprints are joined over gaps of more than 0 and up to {_WIDEST_GAP:g} m, "
+                f"not {gap:g} m"
+            )
         grown = shapely.union_all(shapely.buffer(self.polygons, gap / 2, join_style="mitre"))
         blocks = shapely.get_parts(shapely.buffer(grown, -gap / 2, join_style="mitre"))
         return Footprints.of(blocks, crs=self.crs, source=f"{self.source} (joined over gaps below {gap:g} m)")

@@ -19,7 +19,7 @@ from .footprints import Footprints
 from .las_files import LasHeader, read_points
 from .points import PointCloud
 from .raster import Elevation, Grid, Image
-from .raster_files import RasterHeader
+from .raster_files import RasterHeader, looks_like_values
 from .raster_mosaic import mosaic_elevation, mosaic_image, resampling_note, warped_extent, warped_size
 
 __all__ = [
@@ -47,6 +47,8 @@ Extent = tuple[float, float, float, float]
 _NOISE = (7, 18)
 #: Most cells of a raster: 10 km2 at 0.1 m.
 _MOST_CELLS = 1e9
+#: Heights between which land lies, metres: the shore of the Dead Sea and Mount Everest, with room for any zero.
+_LOWEST_LAND, _HIGHEST_LAND = -1000.0, 10000.0
 #: ASPRS classes whose points lie on the bare earth: ground and water.
 _GROUND, _WATER = 2, 9
 
@@ -98,6 +100,11 @@ def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, ba
     _check_size(place, grid.gsd, "--gsd")
     _note_resampling(place, images, grid)
     image = mosaic_image(images, grid, crs=place.crs, bands=bands)
+    if bands is None and (marked := [header.path for header in images if looks_like_values(header)]):
+        place.log.note(
+            f"{brief(marked)}: the last band is marked as alpha and was taken for the mask, but holds many values: "
+            "if it is near infrared, give --bands red,green,blue,nir"
+        )
     if image.valid is not None and not image.valid.any():
         raise InputError(
             f"{some([header.path for header in images])} has no data in {text(place.extent)}: image and points do not "
@@ -132,6 +139,13 @@ def dem_of(place: Place, models: Sequence[RasterHeader], cell: float | None, poi
     _note_resampling(place, models, grid)
     dem = mosaic_elevation(models, grid, crs=place.crs)
     unknown = np.isnan(dem.values)
+    wild = ~unknown & ((dem.values < _LOWEST_LAND) | (dem.values > _HIGHEST_LAND))
+    if wild.any():
+        value = float(dem.values[wild][0])
+        raise InputError(
+            f"{some(files)} holds heights of {value:g} m, where no land is: if that marks no data, say so with "
+            f"gdal_edit.py -a_nodata {value:g}"
+        )
     if unknown.all():
         raise InputError(
             f"{some(files)} holds no height in {text(place.extent)} (all NaN or no data): give another DEM, or none, "

@@ -22,12 +22,12 @@ from pathlib import Path
 import numpy as np
 
 from . import import_layers as layers
-from .crs import crs_label, require_metric, same_crs
+from .crs import crs_label, named_crs, require_metric, same_crs, scale_warning
 from .errors import CRSError, InputError, ParameterError
-from .folder import open_scene, save_scene
+from .folder import HOLDS, open_scene, save_scene
 from .import_layers import Extent, ImportLog, Place
 from .las_files import LasHeader, read_las_header
-from .output import check_target
+from .output import check_folder
 from .raster_files import RasterHeader, band_names, read_raster_header
 from .raster_mosaic import warped_extent
 from .scene import Scene
@@ -136,9 +136,13 @@ def import_scene(
         raise ParameterError(f"--ground-filter must be opening or cloth, not {ground_filter!r}")
     if ground_filter is not None and dem_files:
         raise ParameterError("give --dem or --ground-filter, not both")
+    if bands is not None and not image_files:
+        raise ParameterError("--bands names the bands of an image: give --ortho")
+    if name is not None and not name.strip():
+        raise ParameterError("--name must not be empty: leave it out for the name of the folder")
     wanted = None if extent is None else _checked_extent(extent)
     target = Path(output)
-    check_target(target, overwrite)
+    check_folder(target, overwrite, holds=HOLDS)
     log = ImportLog(note)
 
     clouds = [read_las_header(file) for file in point_files]
@@ -149,6 +153,11 @@ def import_scene(
     scene_crs = _decide_crs(crs, clouds, images, log)
     images, models = _assigned(images, scene_crs, log), _assigned(models, scene_crs, log)
     place = Place(scene_crs, _decide_extent(wanted, scene_crs, clouds, images, log), log)
+    stretched = scale_warning(
+        scene_crs, (place.extent[0] + place.extent[2]) / 2, (place.extent[1] + place.extent[3]) / 2
+    )
+    if stretched:
+        log.note(stretched)
 
     # Small files first: what is wrong with them is told before the long reading of points.
     footprints = None if reference is None else layers.read_reference(place, os.fspath(reference), building_id)
@@ -218,7 +227,8 @@ def _checked_extent(extent: Sequence[float]) -> Extent:
 
 def _decide_crs(given: str | None, clouds: list[LasHeader], images: list[RasterHeader], log: ImportLog) -> str:
     if given is not None:
-        require_metric(given, "--crs")
+        require_metric(given, "--crs", remedy="name a projected one, such as EPSG:25832")
+        given = named_crs(given)
     named = [cloud for cloud in clouds if cloud.crs is not None]
     for cloud in named:
         other = given if given is not None else named[0].crs

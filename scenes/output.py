@@ -6,16 +6,21 @@ ends without an error, so an interrupted command leaves what was there before.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from fnmatch import fnmatch
 from pathlib import Path
 
 from .errors import OutputError
 
-__all__ = ["check_target", "whole_file", "whole_folder"]
+__all__ = ["check_folder", "check_target", "whole_file", "whole_folder"]
+
+#: Errors of a file system that has no room: they name no file.
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def check_target(path: Path, overwrite: bool) -> None:
@@ -28,6 +33,32 @@ def check_target(path: Path, overwrite: bool) -> None:
         raise OutputError(f"{path} cannot be written: no permission to write in {path.parent}")
 
 
+def check_folder(path: Path, overwrite: bool, *, holds: Sequence[str]) -> None:
+    """Raise `OutputError` when a folder cannot be written, or when replacing it would lose somebody else's files.
+
+    Parameters
+    ----------
+    path : Path
+    overwrite : bool
+        Whether an existing folder may be replaced.
+    holds : sequence of str
+        Patterns of the names that such a folder holds; only a folder without any other name is replaced.
+    """
+    check_target(path, overwrite)
+    if not path.exists():
+        return
+    if not path.is_dir():
+        raise OutputError(f"{path} is a file: name a folder")
+    other = sorted(
+        item.name for item in path.iterdir() if item.is_dir() or not any(fnmatch(item.name, name) for name in holds)
+    )
+    if other:
+        more = f" and {len(other) - 1} more" if len(other) > 1 else ""
+        raise OutputError(
+            f"{path} holds {other[0]}{more}, which replacing it would delete: name another folder, or move that away"
+        )
+
+
 @contextmanager
 def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
     """Yield a temporary path with the same name; on success it (and its side files) replace `path`.
@@ -36,8 +67,8 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     """
     target = Path(path)
     check_target(target, overwrite)
-    if target.is_dir():
-        raise OutputError(f"{target} is a folder: name a file")
+    if target.exists() and not target.is_file():
+        raise OutputError(f"{target} is {'a folder' if target.is_dir() else 'a device'}: name a file")
     with _scratch(target) as scratch:
         yield scratch / target.name
         written = sorted(scratch.iterdir(), key=lambda item: item.name == target.name)
@@ -48,12 +79,10 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
 
 
 @contextmanager
-def whole_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
-    """Yield a temporary folder; on success it replaces `path`."""
+def whole_folder(path: str | os.PathLike[str], *, holds: Sequence[str], overwrite: bool = False) -> Iterator[Path]:
+    """Yield a temporary folder; on success it replaces `path`, which may hold nothing but what `holds` names."""
     target = Path(path)
-    check_target(target, overwrite)
-    if target.exists() and not target.is_dir():
-        raise OutputError(f"{target} is a file: name a folder")
+    check_folder(target, overwrite, holds=holds)
     with _scratch(target) as scratch:
         new = scratch / "new"
         new.mkdir()
@@ -73,7 +102,7 @@ def _scratch(target: Path) -> Iterator[Path]:
     try:
         yield folder
     except OSError as error:
-        if isinstance(error, OutputError) or error.filename is None:
+        if isinstance(error, OutputError) or (error.filename is None and error.errno not in _NO_ROOM):
             raise
         raise OutputError(f"{target} cannot be written: {error.strerror}") from error
     finally:

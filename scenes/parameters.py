@@ -80,8 +80,10 @@ class Parameter:
             if not isinstance(value, bool):
                 raise wanted
         elif self.type in (int, float):
-            if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+            if isinstance(value, bool) or not isinstance(value, numbers.Real):
                 raise wanted
+            if not math.isfinite(value):
+                raise ParameterError(f"{owner}: {self.name} must be a finite number {self.range_text}, not {value!r}")
             number = float(value)
             if self.type is int and not number.is_integer():
                 raise wanted

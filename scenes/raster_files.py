@@ -28,6 +28,8 @@ __all__ = [
     "BANDS",
     "RasterHeader",
     "band_names",
+    "is_opaque",
+    "looks_like_values",
     "opened",
     "read_elevation",
     "read_image",
@@ -65,6 +67,8 @@ class RasterHeader:
         Unit of the values of an elevation model where the file tells another one than metres.
     scale, offset : float
         From the values in the file to heights: ``value * scale + offset``; mostly 1 and 0.
+    alpha : bool
+        Whether a further, last band is marked as alpha. Many programs mark near infrared so.
     """
 
     path: Path
@@ -77,6 +81,7 @@ class RasterHeader:
     height_unit: str | None
     scale: float
     offset: float
+    alpha: bool = False
 
 
 def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) -> RasterHeader:
@@ -135,6 +140,7 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
             height_unit=_height_unit(source),
             scale=source.scales[0],
             offset=source.offsets[0],
+            alpha=count < len(colours) and colours[-1].name == "alpha",
         )
 
 
@@ -151,7 +157,7 @@ def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = No
     header = _square(read_raster_header(path))
     names = band_names(header, bands)
     require_image_type(header)
-    with opened(header.path) as source:
+    with opened(header.path, opaque=is_opaque(header, names)) as source:
         indexes, kept = _band_indexes(names)
         values = source.read(indexes)
         valid = _valid(source)
@@ -173,7 +179,7 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
         unknown = [name for name in bands if name not in (*BANDS, "-")]
         if unknown:
             raise InputError(f"--bands: {unknown[0]!r} is no band name; use {', '.join(BANDS)}, and - to skip one")
-        if len(bands) != header.band_count:
+        if len(bands) != header.band_count and not (header.alpha and len(bands) == header.band_count + 1):
             raise InputError(
                 f"{header.path} has {header.band_count} bands, but --bands names {len(bands)} "
                 f"({','.join(bands)}): name one for each, - to skip one"
@@ -190,6 +196,21 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
             "name them with --bands, - to skip one"
         )
     return _DEFAULT_BANDS[header.band_count]
+
+
+def is_opaque(header: RasterHeader, names: Sequence[str]) -> bool:
+    """Return whether the names make a band of values of the one that is marked as alpha."""
+    return len(names) > header.band_count and names[-1] != "-"
+
+
+def looks_like_values(header: RasterHeader) -> bool:
+    """Return whether the band that is marked as alpha holds more than opaque and transparent."""
+    if not header.alpha:
+        return False
+    with opened(header.path) as source:
+        rows, columns = (min(side, 512) for side in source.shape)
+        values = np.unique(source.read(source.count, out_shape=(rows, columns)))
+    return len(values) > 8  # soft edges of a mosaic have some
 
 
 def write_image(image: Image, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
@@ -240,8 +261,11 @@ def _profile(grid: Grid, crs: str | None, count: int, dtype: str) -> dict[str, A
 
 
 @contextmanager
-def opened(file: Path) -> Iterator[Any]:
-    """Open a raster; what rasterio raises inside the block becomes one sentence."""
+def opened(file: Path, *, opaque: bool = False) -> Iterator[Any]:
+    """Open a raster; what rasterio raises inside the block becomes one sentence.
+
+    With `opaque` its alpha band is a band as others are, and masks nothing.
+    """
     import warnings
 
     import rasterio
@@ -254,10 +278,33 @@ def opened(file: Path) -> Iterator[Any]:
             warnings.simplefilter("ignore", NotGeoreferencedWarning)  # told as an error by read_raster_header
             source = rasterio.open(file)
         with source:
-            yield source
+            if not opaque:
+                yield source
+                return
+            with _without_alpha(source) as view:
+                yield view
     except RasterioError as error:
-        reason = " ".join(str(error).split())
+        cause = error.__cause__ or error
+        reason = " ".join(str(cause).split())
         raise InputError(f"{file} cannot be read as an image ({reason}): give a GeoTIFF") from error
+
+
+@contextmanager
+def _without_alpha(source: Any) -> Iterator[Any]:
+    """Open a view of a raster in which no band is marked as alpha."""
+    import rasterio
+    from rasterio.enums import ColorInterp
+    from rasterio.io import MemoryFile
+    from rasterio.shutil import copy
+
+    with MemoryFile(ext=".vrt") as memory:
+        copy(source, memory.name, driver="VRT")
+        with rasterio.open(memory.name, "r+") as view:
+            view.colorinterp = [
+                ColorInterp.undefined if colour == ColorInterp.alpha else colour for colour in view.colorinterp
+            ]
+        with rasterio.open(memory.name) as view:
+            yield view
 
 
 def _source_crs(file: Path, source: Any) -> str | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .crs import crs_label, same_crs
 from .errors import CRSError, InputError
 from .raster import Elevation, Grid, Image
-from .raster_files import RasterHeader, band_names, opened, require_image_type
+from .raster_files import RasterHeader, band_names, is_opaque, opened, require_image_type
 
 __all__ = ["mosaic_elevation", "mosaic_image", "resampling_note", "warped_extent", "warped_size"]
 
@@ -44,7 +44,7 @@ def mosaic_image(headers: Sequence[RasterHeader], grid: Grid, *, crs: str, bands
     valid = np.zeros(grid.shape, dtype=bool)
     for header, names in zip(headers, named, strict=True):
         indexes = [names.index(name) + 1 for name in kept]
-        for rows, columns, block, has_data in _warped(header, indexes, grid, crs):
+        for rows, columns, block, has_data in _warped(header, indexes, grid, crs, opaque=is_opaque(header, names)):
             fresh = has_data & ~valid[rows, columns]
             values[:, rows, columns][:, fresh] = block[:, fresh]
             valid[rows, columns] |= fresh
@@ -97,7 +97,7 @@ def warped_size(header: RasterHeader, crs: str) -> float:
 
 
 def _warped(
-    header: RasterHeader, indexes: list[int], grid: Grid, crs: str
+    header: RasterHeader, indexes: list[int], grid: Grid, crs: str, *, opaque: bool = False
 ) -> Iterator[tuple[slice, slice, NDArray[Any], NDArray[np.bool_]]]:
     """Yield (rows, columns, values, has data) of the part of `grid` that a file covers, by bands of rows."""
     from rasterio import Affine
@@ -110,7 +110,7 @@ def _warped(
     rows = _span(-bounds[3], -bounds[1], -grid.north, grid.gsd, grid.rows)
     if columns is None or rows is None:
         return
-    with opened(header.path) as source:
+    with opened(header.path, opaque=opaque) as source:
         ratio = grid.gsd / header.grid.gsd
         resampling = Resampling.average if ratio > 1.5 else Resampling.bilinear
         if not warp and header.square and _same_cells(grid, header.grid):

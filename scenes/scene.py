@@ -23,11 +23,11 @@ __all__ = ["Scene"]
 
 #: What a detector may require, and how it is named to people.
 INPUTS: Mapping[str, str] = {
-    "points": "a point cloud",
-    "image": "an orthoimage",
-    "colour": "an orthoimage with red, green and blue",
-    "nir": "an orthoimage with a near-infrared band",
-    "dem": "a bare-earth DEM",
+    "points": "point cloud",
+    "image": "orthoimage",
+    "colour": "orthoimage with red, green and blue",
+    "nir": "orthoimage with a near-infrared band",
+    "dem": "bare-earth DEM",
 }
 
 
@@ -142,7 +142,7 @@ class Scene:
             if need not in INPUTS:
                 raise InputError(f"{need!r} is nothing that a scene can hold: {', '.join(INPUTS)}")
             if not self._holds(need):
-                return f"scene {self.name!r} has not {INPUTS[need]}"
+                return f"scene {self.name!r} has no {INPUTS[need]}"
         return None
 
     def _holds(self, need: str) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from .crs import common_crs, crs_label, parse_crs, require_metric, same_crs
+from .crs import common_crs, crs_label, named_crs, parse_crs, require_metric, same_crs
 from .errors import CRSError, InputError, OutputError
 from .footprints import Footprints, Repair
 from .names import nearest_hint
@@ -100,7 +100,7 @@ def read_footprints(
     if not file.exists():
         raise InputError(f"{file}: no such file")
     if crs is not None:
-        parse_crs(crs)
+        crs = named_crs(crs)
     closed: list[Repair] = []
     if DRIVERS.get(file.suffix.lower()) == "Parquet":
         geometries, columns, own_crs = _read_parquet(file)
@@ -246,12 +246,13 @@ def _read_ogr(
 
 def _geometries(wkb: NDArray[np.object_]) -> tuple[NDArray[np.object_], list[Repair]]:
     """Return geometries of WKB; rings that end elsewhere than they began are closed and reported."""
-    geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
-    unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
     closed = []
-    for row in unread:
-        geometries[row] = shapely.from_wkb(wkb[row], on_invalid="fix")
-        closed.append(Repair(int(row), "a ring that is not closed", "mended"))
+    with np.errstate(invalid="ignore"):  # coordinates that are NaN: left out and told by Footprints.of
+        geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
+        unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
+        for row in unread:
+            geometries[row] = shapely.from_wkb(wkb[row], on_invalid="fix")
+            closed.append(Repair(int(row), "a ring that is not closed", "mended"))
     return geometries, closed
 
 

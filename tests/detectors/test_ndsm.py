@@ -136,7 +136,7 @@ def test_hardly_any_points_give_no_footprints(n):
 
 
 def test_a_scene_without_points_is_refused_in_one_sentence():
-    with pytest.raises(MissingInputError, match="has not a point cloud"):
+    with pytest.raises(MissingInputError, match="has no point cloud"):
         NDSM().detect(Scene("blind", EXTENT), RNG)
 
 

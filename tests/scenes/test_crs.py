@@ -1,7 +1,7 @@
 import pyproj
 import pytest
 
-from roofbench.scenes.crs import common_crs, crs_label, crs_text, require_metric, same_crs
+from roofbench.scenes.crs import common_crs, crs_label, crs_text, named_crs, require_metric, same_crs, scale_warning
 from roofbench.scenes.errors import CRSError
 
 UTM_WKT = pyproj.CRS("EPSG:25832").to_wkt()
@@ -55,3 +55,17 @@ def test_two_inputs_must_share_their_crs():
         common_crs("EPSG:25832", None, names)
     with pytest.raises(CRSError, match="one is in EPSG:25832 but other in EPSG:25833"):
         common_crs("EPSG:25832", "EPSG:25833", names)
+
+
+@pytest.mark.parametrize("written", ["25832", "epsg:25832", " EPSG:25832", "urn:ogc:def:crs:EPSG::25832", UTM_WKT])
+def test_a_crs_may_be_written_in_many_ways(written):
+    assert named_crs(written) == "EPSG:25832"
+
+
+def test_systems_that_stretch_areas_are_warned_of():
+    assert "2.38 and lengths 1.54" in scale_warning("EPSG:3857", 1e6, 6.38e6)
+    assert scale_warning("EPSG:3857", 1e6, 0.0) is None, "true at the equator"
+    assert scale_warning("EPSG:25832", 5e5, 5.5e6) is None
+    assert scale_warning("EPSG:28992", 84900, 447500) is None
+    assert scale_warning("EPSG:25833", -1e12, 5.5e6) is None, "nothing is known so far away"
+    assert scale_warning(None, 0.0, 0.0) is None

@@ -160,3 +160,21 @@ def test_a_folder_that_is_no_scene_is_answered_in_words(tmp_path):
         rb.open_scene(tmp_path / "nowhere")
     with pytest.raises(InputError, match=r"there is no scene\.toml in it"):
         rb.open_scene(tmp_path)
+
+
+def test_a_scene_never_replaces_a_folder_with_other_files(saved, tmp_path):
+    shutil.copytree(saved, tmp_path / "mine")
+    (tmp_path / "mine" / "reference.qmd").write_text("left by a GIS")
+    rb.save_scene(small_scenes.scene(), tmp_path / "mine", overwrite=True)
+    (tmp_path / "mine" / "project.qgz").write_text("hours of work")
+    with pytest.raises(OutputError, match=r"mine holds project\.qgz, which replacing it would delete"):
+        rb.save_scene(small_scenes.scene(), tmp_path / "mine", overwrite=True)
+
+
+@pytest.mark.parametrize(("crs", "message"), [("EPSG:4326", "geographic"), ("EPSG:1", "no coordinate reference")])
+def test_a_manifest_with_a_crs_that_cannot_be_is_refused(saved, tmp_path, crs, message):
+    shutil.copytree(saved, tmp_path / "wrong")
+    file = tmp_path / "wrong" / "scene.toml"
+    file.write_text(file.read_text().replace(small_scenes.CRS, crs))
+    with pytest.raises(InputError, match=rf"scene\.toml: .*{message}"):
+        rb.open_scene(tmp_path / "wrong")

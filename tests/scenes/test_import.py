@@ -323,6 +323,21 @@ def test_points_without_crs_take_the_one_named_and_say_so(files, bring):
     assert rb.open_scene(files / "out").crs == CRS
 
 
+def test_a_crs_may_be_a_number(files, bring):
+    las(files / "bare.laz")
+    code, _, told = bring("bare.laz", "--crs", CRS.removeprefix("EPSG:"))
+    assert code == 0, told
+    assert rb.open_scene(files / "out").crs == CRS
+
+
+def test_web_mercator_is_warned_of(files, bring):
+    las(files / "web.laz", crs="EPSG:3857")
+    code, _, told = bring("web.laz")
+    assert code == 0, told
+    assert "warning: EPSG:3857 shows areas" in told
+    assert any("EPSG:3857" in note for note in rb.open_scene(files / "out").facts["notes"])
+
+
 def test_heights_above_another_zero_are_warned_of(files, bring):
     dem = small_scenes.scene().dem
     write_elevation(rb.Elevation(dem.values + 46, dem.grid), files / "ellipsoid.tif", crs=CRS)
@@ -538,6 +553,14 @@ def test_a_dem_in_feet(files, refused):
     assert "dem.tif: its heights are in ft" in refused("points.laz", "--dem", "dem.tif")
 
 
+def test_a_dem_whose_gaps_are_heights(files, refused):
+    with rasterio.open(files / "dem.tif", "r+") as target:
+        values = target.read(1)
+        values[3:5, 3:5] = -9999
+        target.write(values, 1)
+    assert "dem.tif holds heights of -9999 m, where no land is" in refused("points.laz", "--dem", "dem.tif")
+
+
 def test_a_reference_of_another_place(files, refused):
     rb.write_footprints(rb.Footprints.of([shapely.box(0, 0, 9, 9)], crs=CRS), files / "far.gpkg")
     message = refused("points.laz", "--reference", "far.gpkg")
@@ -590,6 +613,10 @@ def test_an_area_of_another_place(files, refused):
         (["points.laz", "--dem", "dem.tif", "--ground-filter", "cloth"], "--dem or --ground-filter, not both"),
         (["points.laz", "--points", "p*.laz"], "points.laz is given twice"),
         (["ortho.tif", "--gsd", "0.01", "--extent", "0", "0", "9", "9"], "--extent covers"),
+        (["points.laz", "--bands", "red,green,blue"], "give --ortho"),
+        (["points.laz", "--name", ""], "--name must not be empty"),
+        (["points.laz", "--crs", "EPSG:4326"], "name a projected one"),
+        (["points.laz", "--reference", "reference.gpkg", "--join-gaps", "1e9"], "up to 100 m"),
         (["reference.gpkg"], "reference.gpkg ends neither as a point file"),
     ],
 )

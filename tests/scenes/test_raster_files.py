@@ -8,6 +8,7 @@ from rasterio.enums import ColorInterp
 import roofbench as rb
 from roofbench.scenes.errors import InputError
 from roofbench.scenes.raster_files import (
+    looks_like_values,
     read_elevation,
     read_image,
     read_raster_header,
@@ -132,3 +133,32 @@ def test_oblong_cells_can_be_resampled(tmp_path):
     assert header.grid.extent == (WEST, SOUTH, WEST + 40, SOUTH + 40)
     square = mosaic_image([header], rb.Grid(WEST, SOUTH + 40, 0.5, 80, 80), crs=CRS)
     np.testing.assert_allclose(square.values[0].mean(axis=1), np.arange(80), atol=1)
+
+
+def test_near_infrared_that_is_marked_as_alpha_can_be_named(tmp_path):
+    values = np.random.default_rng(0).integers(0, 255, (4, 80, 80)).astype(np.uint8)
+    values[3, :40] = 0  # dark water: transparent, were it alpha
+    with write(tmp_path / "rgbi.tif", values) as target:
+        target.write(values)
+        target.colorinterp = [ColorInterp.red, ColorInterp.green, ColorInterp.blue, ColorInterp.alpha]
+    header = read_raster_header(tmp_path / "rgbi.tif")
+    assert looks_like_values(header)
+    names = ("red", "green", "blue", "nir")
+    image = read_image(tmp_path / "rgbi.tif", bands=names)
+    np.testing.assert_array_equal(image.values, values)
+    assert (image.bands, image.valid) == (names, None)
+    mosaic = mosaic_image([header], image.grid, crs=CRS, bands=names)
+    np.testing.assert_array_equal(mosaic.values, values)
+    assert mosaic.valid is None
+    masked = read_image(tmp_path / "rgbi.tif", bands=("red", "green", "blue", "-"))
+    assert masked.bands == ("red", "green", "blue")
+    np.testing.assert_array_equal(masked.valid, values[3] > 0)
+
+
+def test_a_mask_in_the_alpha_band_does_not_look_like_values(tmp_path):
+    values = np.full((4, 80, 80), 255, np.uint8)
+    values[3, :20] = 0
+    with write(tmp_path / "rgba.tif", values) as target:
+        target.write(values)
+        target.colorinterp = [ColorInterp.red, ColorInterp.green, ColorInterp.blue, ColorInterp.alpha]
+    assert not looks_like_values(read_raster_header(tmp_path / "rgba.tif"))
