@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+
+if TYPE_CHECKING:
+    import shapely
+
+    from ...scenes.footprints import Footprints
 
 __all__ = ["evaluate"]
 
@@ -24,7 +29,9 @@ def evaluate(
     area: Annotated[
         Literal["exact", "pixels"] | None, typer.Option(help="Areas by polygon overlay or by pixel centres [exact].")
     ] = None,
-    gsd: Annotated[float | None, typer.Option(help="Pixel size in metres, for --area pixels.")] = None,
+    gsd: Annotated[
+        float | None, typer.Option(help="Pixel size in metres, for --area pixels and the RMSE in pixels.")
+    ] = None,
     minimum_area: Annotated[float | None, typer.Option(help="Ignore references below this area, m2.")] = None,
     evaluation_area: Annotated[
         str | None, typer.Option(help="Vector file with the polygon inside which the reference is complete.")
@@ -88,6 +95,12 @@ def evaluate(
                 typer.echo(f"{footprints.source}: {len(footprints.repairs) - 10} more mended or left out", err=True)
             if not len(footprints):
                 typer.echo(f"{footprints.source}: no footprints", err=True)
+        _warn_of_place(found, truth)
+    if evaluation_area and not any(_reaches(boundary, footprints) for footprints in (found, truth)):
+        raise InputError(
+            f"{evaluation_area} holds none of the footprints, neither detected nor reference: "
+            "check that it shows the same place in the CRS that it names"
+        )
     if join_gaps is not None:
         truth = truth.joined(join_gaps)
     result = judge.evaluate(found, truth, area=boundary, grid=grid)
@@ -106,6 +119,36 @@ def evaluate(
 
             save_figure(verdict_figure(result, title=title, area=boundary), plot, overwrite=overwrite)
     typer.echo(format_evaluation(result, form, title=title))
+
+
+def _warn_of_place(detected: Footprints, reference: Footprints) -> None:
+    """Say when the two sets cannot be of one place, or when their CRS gives no true areas."""
+    import numpy as np
+    import shapely
+
+    from ...scenes.crs import scale_warning
+
+    boxes = [shapely.total_bounds(footprints.polygons) for footprints in (detected, reference) if len(footprints)]
+    if not boxes:
+        return
+    low, high = np.max([box[:2] for box in boxes], axis=0), np.min([box[2:] for box in boxes], axis=0)
+    if (low > high).any():
+        told = [f"x {box[0]:.0f} to {box[2]:.0f}, y {box[1]:.0f} to {box[3]:.0f}" for box in boxes]
+        typer.echo(
+            f"warning: {detected.source} lies in {told[0]} and {reference.source} in {told[1]}: no overlap at all, "
+            "check the CRS and the order of the axes",
+            err=True,
+        )
+    stretched = scale_warning(reference.crs or detected.crs, *((boxes[-1][:2] + boxes[-1][2:]) / 2))
+    if stretched:
+        typer.echo(stretched, err=True)
+
+
+def _reaches(area: shapely.Geometry | None, footprints: Footprints) -> bool:
+    """Return whether any footprint meets the area."""
+    import shapely
+
+    return bool(shapely.intersects(area, footprints.polygons).any())
 
 
 def _check_targets(

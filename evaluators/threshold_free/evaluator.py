@@ -109,7 +109,7 @@ class ThresholdFree(Evaluator):
         source="2010 paper, 4.2.2",
     )
     gsd: float | None = parameter(
-        None, unit="m", minimum=1e-6, doc="ground sampling distance of the pixel lattice, where there is no orthoimage"
+        None, unit="m", minimum=0.001, doc="ground sampling distance of the pixel lattice, where there is no orthoimage"
     )
     minimum_area: float = parameter(
         0.0, unit="m2", minimum=0.0, doc="smaller references do not count, nor do detections that overlap only them"
@@ -426,7 +426,10 @@ def _tally_notes(tallies: Mapping[str, float]) -> Iterator[str]:
     elif scenes:
         yield f"areas counted in pixels in {by_pixels} of {scenes} scenes, exact in the others"
     if number("left_out.detected"):
-        yield f"{_counted(number('left_out.detected'), 'detection')} left out"
+        yield (
+            f"{_counted(number('left_out.detected'), 'detection')} left out: outside the evaluation area, "
+            "or on references that are left out"
+        )
     if number("left_out.reference_outside"):
         yield f"{_counted(number('left_out.reference_outside'), 'reference')} outside the evaluation area left out"
     if number("left_out.reference_small"):

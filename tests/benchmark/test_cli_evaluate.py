@@ -150,7 +150,8 @@ def test_a_scene_folder_brings_reference_area_and_grid(files):
     result = json.loads(roofbench("evaluate", "d.geojson", "small/", "-f", "json", folder=files).stdout)
     assert result["counts"]["reference"] == 2
     assert result["left_out"]["reference_outside"] == 2
-    assert result["notes"][1:] == ["1 detection left out", "2 references outside the evaluation area left out"]
+    told = "1 detection left out: outside the evaluation area, or on references that are left out"
+    assert result["notes"][1:] == [told, "2 references outside the evaluation area left out"]
     roofbench("evaluate", "d.geojson", "small/", "--plot", "v.svg", "-q", folder=files)
     drawing = (files / "v.svg").read_text(encoding="utf-8")
     assert "detection left out (1)" in drawing
@@ -170,6 +171,22 @@ def test_houses_of_a_row_are_joined_to_blocks_on_request(files):
     assert blocks["pixel"]["quality"] == pytest.approx(1)
 
 
+def test_sets_that_cannot_be_of_one_place_are_warned_of(files):
+    swapped = shapely.transform(np.array(HOUSES), lambda points: points[:, ::-1] + np.array([500, 0]))
+    rb.write_footprints(rb.Footprints.of(swapped, crs="EPSG:25832"), files / "swapped.gpkg")
+    told = roofbench("evaluate", "swapped.gpkg", "r.gpkg", folder=files).stderr
+    assert "warning: swapped.gpkg lies in x 500 to" in told
+    assert "no overlap at all" in told
+    assert roofbench("evaluate", "d.geojson", "r.gpkg", folder=files).stderr == ""
+
+
+def test_areas_that_a_projection_stretches_are_warned_of(files):
+    north = shapely.transform(np.array(HOUSES), lambda points: points + np.array([1e6, 6.38e6]))
+    rb.write_footprints(rb.Footprints.of(north, crs="EPSG:3857"), files / "web.gpkg")
+    assert "EPSG:3857 shows areas 2.38" in roofbench("evaluate", "web.gpkg", "web.gpkg", folder=files).stderr
+    assert roofbench("evaluate", "web.gpkg", "web.gpkg", "-q", folder=files).stderr == ""
+
+
 BAD_INPUT = {
     "missing file": (["x.gpkg", "r.gpkg"], "x.gpkg: no such file"),
     "no vector file": (["noise.gpkg", "r.gpkg"], "noise.gpkg cannot be read as a vector file"),
@@ -187,11 +204,15 @@ BAD_INPUT = {
     "existing output": (["d.geojson", "r.gpkg", "--verdicts", "r.gpkg"], "--overwrite"),
     "pixels without size": (["d.geojson", "r.gpkg", "--area", "pixels"], "--gsd"),
     "negative size": (["d.geojson", "r.gpkg", "--area", "pixels", "--gsd", "-1"], "gsd must be at least"),
+    "pixels without end": (["d.geojson", "r.gpkg", "--area", "pixels", "--gsd", "1e-6"], "at least 0.001 m"),
+    "no finite area": (["d.geojson", "r.gpkg", "--minimum-area", "inf"], "must be a finite number"),
+    "area elsewhere": (["d.geojson", "r.gpkg", "--evaluation-area", "elsewhere.gpkg"], "holds none of the footprints"),
+    "only NaN": (["d.geojson", "nan.geojson"], "nan.geojson: no polygons"),
     "unknown evaluator": (["d.geojson", "r.gpkg", "-e", "treshold-free"], "did you mean 'threshold-free'"),
     "unknown parameter": (["d.geojson", "r.gpkg", "-e", "threshold-free[maching=overlap]"], "did you mean 'matching'"),
-    "no gap to join": (["d.geojson", "r.gpkg", "--join-gaps", "0"], "more than 0 m"),
+    "no gap to join": (["d.geojson", "r.gpkg", "--join-gaps", "0"], "more than 0 and up to 100 m"),
     "a folder that is no scene": (["d.geojson", "."], "scene.toml"),
-    "endless gap to join": (["d.geojson", "r.gpkg", "--join-gaps", "inf"], "more than 0 m, not inf"),
+    "endless gap to join": (["d.geojson", "r.gpkg", "--join-gaps", "inf"], "more than 0 and up to 100 m, not inf"),
     "building ids of blocks": (
         ["d.geojson", "r.gpkg", "--building-id", "register", "--join-gaps", "0.1"],
         "--building-id or --join-gaps, not both",
@@ -211,6 +232,8 @@ def test_bad_input_gets_one_sentence_and_exit_code_two(files, case):
     (files / "noise.gpkg").write_bytes(b"this is no database" * 100)
     (files / "table.csv").write_text("a,b\n1,2\n")
     rb.write_footprints(rb.Footprints.of(MOVED, crs="EPSG:25833"), files / "utm33.gpkg")
+    rb.write_footprints(rb.Footprints.of([shapely.box(900, 900, 999, 999)], crs="EPSG:25832"), files / "elsewhere.gpkg")
+    (files / "nan.geojson").write_text(re.sub(r"\[ [\d.]+,", "[ NaN,", (files / "d.geojson").read_text()))
     rb.write_footprints(rb.Footprints.of(MOVED), files / "bare.fgb")
     degrees = [shapely.box(9, 50, 9.001, 50.001)]
     rb.write_footprints(rb.Footprints.of(degrees, crs="EPSG:4326"), files / "degrees.gpkg")
