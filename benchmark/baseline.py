@@ -182,7 +182,8 @@ class Baseline:
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             if isinstance(error, InputError):
                 raise
-            raise InputError(f"{file} is no baseline: {type(error).__name__}: {error}") from error
+            missing = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+            raise InputError(f"{file} is no baseline ({missing}): 'roofbench baseline save' makes one") from error
 
     @classmethod
     def _from(cls, content: Mapping[str, Any]) -> Self:

@@ -27,6 +27,7 @@ from .worker import detect
 __all__ = ["Check", "check_detector", "check_evaluator"]
 
 _SECONDS = 300.0
+_ELSEWHERE = "works in another process, with the same result"
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,10 @@ def check_detector(detector: Detector) -> list[Check]:
     """Return the checks of a detector, on a small synthetic scene."""
     scene = hamlet(1)
     before = scene.content_hash
+    elsewhere = _elsewhere(detector)
+    if elsewhere.status == "failed" and not elsewhere.machine:
+        # It took its process with it: this one must not be next.
+        return [*_declaration(detector), Check(_ELSEWHERE, elsewhere.reason)]
     return [
         *_declaration(detector),
         _check("requires names inputs that scenes have", lambda: _lacks(detector, scene)),
@@ -54,7 +59,7 @@ def check_detector(detector: Detector) -> list[Check]:
         _check("is stochastic exactly if it says so", lambda: _stochastic(detector, scene)),
         _check("leaves the scene as it was", lambda: "" if _digest(scene) == before else "it changed the arrays"),
         _check("a scene without buildings is no error", lambda: _found(detector, _meadow(scene))),
-        _check("works in another process, with the same result", lambda: _elsewhere(detector, scene)),
+        _check(_ELSEWHERE, lambda: _as_here(elsewhere, detector, scene)),
     ]
 
 
@@ -85,8 +90,8 @@ def _check(rule: str, problem: Callable[[], str]) -> Check:
         return Check(rule, problem())
     except RoofbenchError as error:
         return Check(rule, str(error))
-    except Exception as error:
-        return Check(rule, f"{type(error).__name__}: {error}")
+    except (Exception, SystemExit) as error:
+        return Check(rule, " ".join(f"{type(error).__name__}: {error}".split()))
 
 
 def _declaration(plugin: Parameterised) -> Iterator[Check]:
@@ -149,14 +154,18 @@ def _meadow(scene: Scene) -> Scene:
     return Scene("meadow", scene.extent, crs=scene.crs, points=cloud.take(low), image=grey, dem=dem)
 
 
-def _elsewhere(detector: Detector, scene: Scene) -> str:
+def _elsewhere(detector: Detector) -> Outcome:
+    """Return what comes of the detector in a process of its own."""
     recipe = PluginRecipe.of(detector)
     task = Task(scene=SceneRecipe.of_preset("hamlet", seed=1), detector=recipe, seed=0, evaluators=())
     process = IsolatedProcess()
     try:
-        outcome = Outcome.from_bytes(process.call(task.to_json(), Limits(_SECONDS)))
+        return Outcome.from_bytes(process.call(task.to_json(), Limits(_SECONDS)))
     finally:
         process.close()
+
+
+def _as_here(outcome: Outcome, detector: Detector, scene: Scene) -> str:
     if outcome.status != "ok":
         return outcome.reason
     same = list(outcome.detections) == shapely.to_wkb(detect(scene, detector).polygons).tolist()

@@ -17,7 +17,8 @@ from ..detectors.registry import make_detector
 from ..evaluators.base import Index
 from ..evaluators.registry import make_evaluator
 from ..reports.report_data import Sensitivity, SensitivityPoint
-from ..scenes.errors import InputError, RoofbenchError
+from ..scenes.errors import InputError, RoofbenchError, UnknownNameError
+from ..scenes.names import nearest_hint
 from ..scenes.synthetic.presets import preset, preset_names
 from ..scenes.synthetic.recipe import SceneParameters
 from .inference import bootstrap_interval
@@ -39,6 +40,10 @@ Values = Mapping[int, Mapping[str, float | None]]
 
 def sensitivity_indices(indices: Sequence[Index], chosen: Sequence[str] = ()) -> list[Index]:
     """Return the indices to plot: those chosen, else object- and area-based quality, else the first one."""
+    known = [index.key for index in indices]
+    for key in chosen:
+        if key not in known:
+            raise UnknownNameError(f"no index {key!r}{nearest_hint(key, known)}; there are {', '.join(known)}")
     wanted = [index for index in indices if index.key in (chosen or _INDICES)]
     return wanted or list(indices[:1])
 

@@ -22,9 +22,16 @@ def check_picture(path: Path) -> None:
 
 
 def save_figure(
-    figure: Figure, path: str | os.PathLike[str], *, dpi: float | None = None, overwrite: bool = False
+    figure: Figure,
+    path: str | os.PathLike[str],
+    *,
+    dpi: float | None = None,
+    tight: bool = False,
+    overwrite: bool = False,
 ) -> None:
     """Write a figure; the ending of the file name chooses the format, `dpi` the pixels per inch of a PNG.
+
+    `tight` fits the picture to what is drawn: no empty margins, and no key cut off.
 
     Raises
     ------
@@ -36,4 +43,6 @@ def save_figure(
     with whole_file(target, overwrite=overwrite) as scratch:
         # No creation date: the same input gives the same bytes.
         metadata = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[target.suffix.lower()]
-        figure.savefig(scratch, metadata=metadata, dpi="figure" if dpi is None else dpi)
+        figure.savefig(
+            scratch, metadata=metadata, dpi="figure" if dpi is None else dpi, bbox_inches="tight" if tight else None
+        )

@@ -37,9 +37,9 @@ def read_gate(path: Path) -> GateResult:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
+        missing = f"it has no {error}" if isinstance(error, KeyError) else str(error)
         raise InputError(
-            f"{path}: no result of the gate ({type(error).__name__}: {error}): 'roofbench gate BASELINE --format json' "
-            "prints one"
+            f"{path}: no result of the gate ({missing}): 'roofbench gate BASELINE --format json' prints one"
         ) from error
 
 

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...scenes.errors import ParameterError
+from ...scenes.errors import ParameterError, RoofbenchError, UnknownNameError
 from .options import PluginOption, QuietOption, load_plugins
 
 if TYPE_CHECKING:
     from ...detectors.base import Detector
     from ...evaluators.base import Evaluator
     from ...scenes.scene import Scene
+
+#: Names in a folder of steps.
+_STEPS = ("README.md", "[0-9][0-9]-*.png")
 
 
 def detect(
@@ -33,8 +40,8 @@ def detect(
     import time
 
     from ...detectors.registry import make_detector
-    from ...scenes.output import check_target
-    from ...scenes.vector_files import write_footprints
+    from ...scenes.output import check_folder, check_target
+    from ...scenes.vector_files import output_driver, write_footprints
     from ..suite import scenes_of
     from ..worker import detect as run_detector
 
@@ -48,14 +55,19 @@ def detect(
             raise ParameterError(f"cannot read --parameter {item!r}: write NAME=VALUE")
         values[name.strip()] = value.strip()
     chosen = make_detector(detector, values)
-    for target in (output, steps):
-        if target is not None:
-            check_target(target, overwrite)
+    if output is not None:
+        check_target(output, overwrite)
+        output_driver(output)
+    if steps is not None:
+        check_folder(steps, overwrite, holds=_STEPS)
     (recipe,) = scenes_of([scene])
     place = recipe.open()
+    if Path(scene).exists():
+        _ = place.content_hash  # tells a file that was edited or replaced since the scene was made
     if output is not None:
         started = time.process_time()
-        found = run_detector(place, chosen, seed=seed)
+        with _failures_told(chosen, place):
+            found = run_detector(place, chosen, seed=seed)
         seconds = time.process_time() - started
         write_footprints(found, output, overwrite=overwrite)
         if not quiet:
@@ -74,16 +86,33 @@ def _write_steps(detector: Detector, scene: Scene, seed: int, folder: Path, over
     from ..worker import random_stream
 
     captions = []
-    with whole_folder(folder, overwrite=overwrite) as scratch:
+    with whole_folder(folder, holds=_STEPS, overwrite=overwrite) as scratch:
         visible = scene.for_detection()
         visible.require(detector.requires)
-        for step in detector.steps(visible, random_stream(seed, scene, detector)):
-            figure = Figure(figsize=(8, 8), layout="constrained")
-            step.draw(figure)
-            save_figure(figure, scratch / f"{step.name}.png")
-            captions.append(f"- `{step.name}.png`: {step.caption}\n")
+        with _failures_told(detector, scene):
+            for step in detector.steps(visible, random_stream(seed, scene, detector)):
+                figure = Figure(figsize=(8, 8), layout="constrained")
+                step.draw(figure)
+                save_figure(figure, scratch / f"{step.name}.png", tight=True)
+                captions.append(f"- `{step.name}.png`: {step.caption}\n")
         (scratch / "README.md").write_text(f"# {detector.name} on {scene.name}\n\n" + "".join(captions), "utf-8")
     return len(captions)
+
+
+@contextmanager
+def _failures_told(detector: Detector, scene: Scene) -> Iterator[None]:
+    """Tell an error inside a detector as `roofbench run` does, below the end of its traceback; exit code 3."""
+    try:
+        # Standard output is for data: what a plugin prints is a message.
+        with redirect_stdout(sys.stderr):
+            yield
+    except (RoofbenchError, OSError, typer.Exit):
+        raise
+    except (Exception, SystemExit) as error:
+        traceback.print_exc(limit=-4)
+        told = " ".join(f"{type(error).__name__}: {error}".split())
+        typer.echo(f"Error: {detector.name} failed on {scene.name}: {told}", err=True)
+        raise typer.Exit(3) from error
 
 
 def check_plugin(
@@ -93,21 +122,23 @@ def check_plugin(
     """Check that a detector or evaluator keeps to the rules, on a small built-in scene; exit code 3 when not."""
     from ...detectors.registry import DETECTORS, make_detector
     from ...evaluators.registry import EVALUATORS, make_evaluator
-    from ...scenes.errors import UnknownNameError
     from ...scenes.names import nearest_hint, parse_selection
     from .. import conformance
 
     load_plugins(plugin)
     known = [*DETECTORS.names(), *EVALUATORS.names()]
     word = parse_selection(name)[0]
+    chosen: Detector | Evaluator
     if ".py" in word:
-        checks = conformance.check_plugin(_from_file(name))
+        chosen = _from_file(name)
     elif word in DETECTORS.names():
-        checks = conformance.check_detector(make_detector(name))
+        chosen = make_detector(name)
     elif word in EVALUATORS.names():
-        checks = conformance.check_evaluator(make_evaluator(name))
+        chosen = make_evaluator(name)
     else:
         raise UnknownNameError(f"no plugin called {word!r}{nearest_hint(word, known)}; there are {', '.join(known)}")
+    with redirect_stdout(sys.stderr):
+        checks = conformance.check_plugin(chosen)
     for check in checks:
         typer.echo(
             f"{'ok    ' if check.passed else 'BROKEN'}  {check.rule}{': ' + check.problem if check.problem else ''}"
@@ -120,11 +151,18 @@ def check_plugin(
 
 def _from_file(selection: str) -> Detector | Evaluator:
     """Return the detector or the evaluator that ``file.py:Class`` names, whichever it is."""
-    from ...detectors.registry import make_detector
-    from ...evaluators.registry import make_evaluator
-    from ...scenes.errors import RoofbenchError
+    from ...detectors.registry import DETECTORS, make_detector
+    from ...evaluators.registry import EVALUATORS, make_evaluator
+    from ...scenes.names import parse_selection
 
+    word = parse_selection(selection)[0]
+    file = Path(word.partition(".py")[0] + ".py")
+    if ":" not in word.rpartition(".py")[2] and not DETECTORS.add_all(file) and not EVALUATORS.add_all(file):
+        raise UnknownNameError(f"{file} holds neither a detector nor an evaluator: derive from roofbench.Detector")
     try:
         return make_detector(selection)
-    except RoofbenchError:
-        return make_evaluator(selection)
+    except ParameterError as error:
+        try:
+            return make_evaluator(selection)
+        except ParameterError:
+            raise error from None

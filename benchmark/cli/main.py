@@ -18,6 +18,9 @@ from . import detect, evaluate, gate, plot, report, run, runs, scenes, sweep
 
 __all__ = ["app", "main"]
 
+#: Exit code after Ctrl-C, as shells have it: 128 and the number of the signal.
+_INTERRUPTED = 130
+
 app = typer.Typer(
     name="roofbench",
     help="Evaluation-first benchmark for building detection from airborne LiDAR and orthoimagery.",
@@ -60,19 +63,37 @@ def _root(
 
 
 def main() -> None:
-    """Run the command line; errors of roofbench end with one sentence and exit code 2."""
+    """Run the command line; errors of roofbench and of the file system end with one sentence and exit code 2."""
     try:
-        app()
+        try:
+            app(prog_name="roofbench")
+        finally:
+            if sys.stdout is not None and not sys.stdout.closed:
+                sys.stdout.flush()
     except RoofbenchError as error:
-        typer.secho(f"Error: {error}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+        _tell(str(error))
         sys.exit(2)
-    except KeyboardInterrupt:
-        typer.echo("Stopped.", err=True)
-        sys.exit(130)
+    except SystemExit as leaving:
+        if leaving.code == _INTERRUPTED:
+            typer.echo("Stopped: no half-written file is left; 'roofbench run --resume' goes on with a run", err=True)
+        raise
     except BrokenPipeError:
-        # The reader of a pipe (head, less) has gone: not an error. Keep Python from flushing into the closed pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader of a pipe (head, less) has gone: not an error.
+        _close_stdout()
         sys.exit(0)
+    except OSError as error:
+        _tell(f"{error.filename or 'the output'}: {error.strerror or error}")
+        _close_stdout()
+        sys.exit(2)
+
+
+def _tell(sentence: str) -> None:
+    typer.secho(f"Error: {sentence}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+
+
+def _close_stdout() -> None:
+    """Keep Python from flushing into a pipe that is closed or a disk that is full."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":

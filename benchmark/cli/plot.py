@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -137,6 +138,11 @@ def _window(text: str | None, extent: tuple[float, float, float, float]) -> tupl
         x, y, width, height = (float(part) for part in text.split(","))
     except ValueError:
         raise ParameterError(f"cannot read --window {text!r}: write X,Y,WIDTH,HEIGHT in metres") from None
-    if not (width > 0 and height > 0):
-        raise ParameterError(f"--window {text}: width and height must be more than 0 m")
+    if not all(map(math.isfinite, (x, y, width, height))) or width <= 0 or height <= 0:
+        raise ParameterError(f"--window {text}: width and height must be more than 0 m, all four must be finite")
+    if x >= extent[2] - extent[0] or y >= extent[3] - extent[1] or x + width <= 0 or y + height <= 0:
+        raise ParameterError(
+            f"--window {text} lies beside the scene, which is {extent[2] - extent[0]:.0f} m wide and "
+            f"{extent[3] - extent[1]:.0f} m high"
+        )
     return extent[0] + x, extent[1] + y, extent[0] + x + width, extent[1] + y + height

@@ -79,6 +79,8 @@ def run(
         if scenes is not None:
             suite = suite.with_scenes(scenes)
         rank_index(suite.evaluators[0], rank_by)
+        if output is not None and not dry_run:
+            _make_folder(output)
         plan = make_plan(suite, opened, overwrite=overwrite, only_failed=retry_failed)
         if dry_run:
             _print_plan(plan)
@@ -123,11 +125,23 @@ def _print_plan(plan: Plan) -> None:
     )
 
 
+def _make_folder(folder: Path) -> None:
+    """Make the folder for results before the long work, or say why it cannot be."""
+    from ...scenes.errors import OutputError
+    from ...scenes.output import check_target
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = "it is a file" if folder.is_file() else error.strerror
+        raise OutputError(f"{folder} cannot be made: {reason}; name another folder with -o") from error
+    check_target(folder / "report.html", overwrite=True)
+
+
 def _write(folder: Path, boards: list[Leaderboard]) -> None:
     """Write one CSV and one Markdown file; a further evaluator gets files of its own name."""
     from ...scenes.output import whole_file
 
-    folder.mkdir(parents=True, exist_ok=True)
     for number, board in enumerate(boards):
         name = "leaderboard" if number == 0 else f"leaderboard-{board.evaluator.partition(' ')[0]}"
         for ending, text in (("csv", board.to_csv()), ("md", board.to_markdown())):

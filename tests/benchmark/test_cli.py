@@ -126,9 +126,13 @@ def test_detect_writes_what_a_run_stores(cli, misbehaving):
         (("run", "hamlet", "--plugin", "absent.py"), "absent.py: no such file"),
         (("ls",), "no such results store"),
         (("check-plugin", "ndms"), "did you mean 'ndsm'"),
+        (("check-plugin", "absent.py"), "absent.py: no such file"),
+        (("plot", "gate", "empty.json", "-o", "x.png"), "it has no 'baseline'"),
+        (("gate", "empty.json"), "it has no 'format'"),
     ],
 )
-def test_a_wrong_word_is_one_sentence_and_exit_code_2(cli, words, message):
+def test_a_wrong_word_is_one_sentence_and_exit_code_2(cli, words, message, tmp_path):
+    (tmp_path / "empty.json").write_text("{}")
     told = cli(*words, code=2)
     assert message in told
     assert "\n" not in told
@@ -154,3 +158,103 @@ def test_check_plugin_accepts_an_honest_detector_and_names_broken_rules(cli, mis
 
 def test_check_plugin_accepts_the_built_in_evaluator(cli):
     assert "rules kept" in cli("check-plugin", "threshold-free").stdout
+
+
+BAD_PLUGINS = """
+import os
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+
+import roofbench as rb
+
+print("told while it is imported")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leaves(rb.Detector):
+    \"\"\"Leaves the interpreter.\"\"\"
+
+    name = "leaves"
+
+    def detect(self, scene, rng):
+        print("told while it runs")
+        sys.exit(0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crashes(Leaves):
+    \"\"\"Takes its process with it.\"\"\"
+
+    name = "crashes"
+
+    def detect(self, scene, rng):
+        os.kill(os.getpid(), 9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stumbles(Leaves):
+    \"\"\"Raises.\"\"\"
+
+    name = "stumbles"
+
+    def detect(self, scene, rng):
+        raise ZeroDivisionError("no houses\\nat all")
+"""
+
+
+@pytest.fixture(scope="module")
+def bad_plugins(tmp_path_factory):
+    """Return one file for all tests: names of plugins are taken once in a process."""
+    file = tmp_path_factory.mktemp("plugins") / "bad.py"
+    file.write_text(BAD_PLUGINS)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("Leaves", "left the interpreter with exit code 0"),
+        ("Crashes", "killed by signal 9"),
+        ("Stumbles", "ZeroDivisionError: no houses at all"),
+    ],
+)
+def test_check_plugin_outlives_a_detector_that_takes_its_process_along(cli, bad_plugins, name, problem):
+    result = cli("check-plugin", f"{bad_plugins}:{name}", code=3)
+    assert problem in result.stdout
+    assert "rules kept" in result.stdout.splitlines()[-1]
+    assert "told while" not in result.stdout
+
+
+@pytest.mark.parametrize(("name", "problem"), [("Leaves", "SystemExit: 0"), ("Stumbles", "no houses at all")])
+def test_detect_tells_an_error_of_the_detector_after_its_traceback(cli, bad_plugins, tmp_path, name, problem):
+    result = cli("detect", f"{bad_plugins}:{name}", "hamlet", "-o", "out.gpkg", code=3)
+    assert result.stdout == ""
+    *before, last = result.stderr.strip().splitlines()
+    assert last.startswith(f"Error: {name.lower()} failed on hamlet-0: ")
+    assert problem in last
+    assert any(line.startswith("Traceback") for line in before)
+    assert not (tmp_path / "out.gpkg").exists()
+
+
+def test_detect_notices_a_file_that_was_replaced(cli, misbehaving, tmp_path):
+    rb.save_scene(hamlet(1), tmp_path / "one")
+    rb.save_scene(hamlet(2), tmp_path / "two")
+    (tmp_path / "two" / "dem.tif").replace(tmp_path / "one" / "dem.tif")
+    assert "dem.tif changed since scene.toml was written" in cli("detect", "ndsm", "one", "-o", "out.gpkg", code=2)
+
+
+def test_pictures_of_steps_never_replace_a_folder_of_something_else(cli, tmp_path):
+    rb.save_scene(hamlet(1), tmp_path / "one")
+    told = cli("detect", "ndsm", "hamlet", "--steps", "one", "--overwrite", code=2)
+    assert "one holds" in told
+    cli("detect", "ndsm", "hamlet", "--steps", "steps")
+    cli("detect", "ndsm", "hamlet", "--steps", "steps", "--overwrite")
+
+
+def test_the_folder_for_results_is_checked_before_the_runs(cli, misbehaving, tmp_path):
+    (tmp_path / "out").write_text("a file")
+    told = cli("run", "hamlet", "-d", misbehaving, "-j", 0, "-o", "out", code=2)
+    assert "out cannot be made: it is a file" in told
+    assert "0 of 0 runs" in cli("ls").stdout

@@ -134,7 +134,7 @@ def test_a_missing_input_is_a_skip_and_an_empty_result_is_a_result(tmp_path):
     board = rb.run(scenes=[hamlet(1)], detectors=[Blind(), Truthless()], store=tmp_path / "a.sqlite")
     with Store(tmp_path / "a.sqlite") as store:
         assert {(row.label, row.status, row.reason) for row in store.runs()} == {
-            ("blind", "skipped", "scene 'hamlet-1' has not an orthoimage with a near-infrared band"),
+            ("blind", "skipped", "scene 'hamlet-1' has no orthoimage with a near-infrared band"),
             ("truthless", "ok", ""),
         }
     pooled = {entry.label: entry for entry in board.entries if entry.pooling == "pooled"}

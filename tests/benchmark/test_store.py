@@ -130,6 +130,11 @@ def test_a_file_that_is_no_store_or_a_newer_one_is_refused(tmp_path):
     other.close()
     with pytest.raises(InputError, match="a database of something else"):
         Store(tmp_path / "other.sqlite")
+    other = sqlite3.connect(tmp_path / "other.sqlite")
+    other.execute("PRAGMA user_version = 10400")  # as GeoPackages have it
+    other.close()
+    with pytest.raises(InputError, match="a database of something else"):
+        Store(tmp_path / "other.sqlite")
     Store(tmp_path / "newer.sqlite").close()
     newer = sqlite3.connect(tmp_path / "newer.sqlite")
     newer.execute(f"PRAGMA user_version = {VERSION + 1}")
