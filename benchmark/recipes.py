@@ -151,7 +151,9 @@ class SceneRecipe:
     @property
     def group(self) -> str:
         """What the scene is one of: the preset with its parameters but without its seed, else its own name."""
-        return self.name.replace(f"-{self.seed}", "", 1) if self.kind in ("preset", "builtin") else self.name
+        if self.kind not in ("preset", "builtin"):
+            return self.name
+        return self.place + self.name.removeprefix(f"{self.place}-{self.seed}")
 
     @property
     def key(self) -> str:

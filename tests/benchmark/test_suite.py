@@ -81,6 +81,12 @@ def test_a_list_is_a_sweep_axis(suite_file):
         read_suite(suite_file(varied.replace("slope", "slpe")))
 
 
+def test_the_group_of_a_scene_is_its_preset_even_where_that_has_a_number():
+    words = ["fairfield-1-small[seed=1]", "fairfield-small[seed=1]", "fairfield-1[seed=1,slope=5]", "hamlet[seed=1]"]
+    groups = [scene.group for scene in scenes_of(words)]
+    assert groups == ["fairfield-1-small", "fairfield-small", "fairfield-1[slope=5]", "hamlet"]
+
+
 def test_words_name_scenes():
     (scene,) = scenes_of(["hamlet[seed=3]"])
     assert (scene.name, scene.seed, scene.word) == ("hamlet-3", 3, "hamlet[seed=3]")
