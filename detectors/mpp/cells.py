@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numba import njit
@@ -65,13 +66,19 @@ class Cells:
     openness: NDArray[np.uint8]
 
 
-def cell_size(x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequence[float]) -> float:
+def cell_size(
+    x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequence[float], *, workers: Workers = ALONE
+) -> float:
     """Return the cell size in metres at which a covered cell holds one point on average: 0.5 to 2 m in steps of 0.25.
 
     Squares of 4 m without a point do not count as covered (water, a ragged border).
     """
     coarse = Grid.covering(extent, 4.0)
-    covered, points = _coverage(x, y, coarse.west, coarse.north, coarse.rows, coarse.columns)
+    edges = [len(x) * part // workers.count for part in range(workers.count + 1)]
+    place = (coarse.west, coarse.north, coarse.rows, coarse.columns)
+    found = workers.map(lambda part: _coverage(x[slice(*part)], y[slice(*part)], *place), pairwise(edges))
+    covered = np.count_nonzero(np.logical_or.reduce([seen for seen, _ in found]))
+    points = sum(count for _, count in found)
     if points == 0:
         return 1.0
     spacing = math.sqrt(16.0 * covered / points)
@@ -80,16 +87,15 @@ def cell_size(x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequence[f
 
 @njit(cache=True, nogil=True)
 def _coverage(x, y, west, north, rows, columns):  # type: ignore[no-untyped-def]
+    """Return which squares of 4 m hold a point, and how many points lie in any."""
     seen = np.zeros((rows, columns), dtype=np.bool_)
-    covered, points = 0, 0
+    points = 0
     for i in range(len(x)):
         column, row = (x[i] - west) * 0.25, (north - y[i]) * 0.25
         if 0 <= column < columns and 0 <= row < rows:
             points += 1
-            if not seen[int(row), int(column)]:
-                seen[int(row), int(column)] = True
-                covered += 1
-    return covered, points
+            seen[int(row), int(column)] = True
+    return seen, points
 
 
 def make_cells(

@@ -67,7 +67,7 @@ class Prepared:
 
 def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers) -> Prepared:
     """Turn the cloud into cells, classes, tables and boxes."""
-    cell = parameters.cell or cell_size(points.x, points.y, scene.extent)
+    cell = parameters.cell or cell_size(points.x, points.y, scene.extent, workers=workers)
     if math.sqrt(2) * parameters.largest_side > LONGEST * cell:
         raise ParameterError(
             f"mpp: largest_side of {parameters.largest_side:g} m is too long for cells of {cell:g} m; a rectangle must "
@@ -75,15 +75,15 @@ def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers)
             f"or raise cell"
         )
     background, height, state, score, fitted = _classes(parameters, points, scene, cell, workers)
-    boxes, weights = np.empty((0, 5)), np.empty(0)
-    tables = make_tables(height, fitted, score, workers=workers)
-    model = _model(parameters, cell)
+    boxes = np.empty((0, 5))
     if parameters.data_births > 0 or parameters.start == "greedy":
         least = math.ceil(6 / cell**2)
         boxes = propose_boxes(height, fitted, steps=(0.4, 1.0, 1000.0), least_cells=least, workers=workers)
-        energies = own_energies(tables.small, tables.large, boxes, model)
-        order = np.argsort(energies, kind="stable")
-        boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
+    tables = make_tables(height, fitted, score, workers=workers)
+    model = _model(parameters, cell)
+    energies = own_energies(tables.small, tables.large, boxes, model)
+    order = np.argsort(energies, kind="stable")
+    boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
     grid = Grid.covering(scene.extent, cell)
     return Prepared(grid, height, state, score, background, tables, model, boxes, weights)
 
@@ -100,6 +100,7 @@ def _classes(
     cells = make_cells(points, ground, Grid.covering(scene.extent, cell), low=low, workers=workers)
     background, bins = estimate_background(cells, workers=workers)
     score, fitted = _scored(parameters, cells, bins, background, workers)
+    del bins
     if parameters.carried_share <= 1:
         height, state = lower_superstructures(
             cells.height,
@@ -108,6 +109,7 @@ def _classes(
             step=parameters.roof_step,
             share=parameters.carried_share,
             most=int(parameters.furniture / cell**2),
+            workers=workers,
         )
         cells = replace(cells, height=height, state=state)
         bins = textures(cells.height, cells.state, cells.openness, workers=workers)

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from .candidates import label_patches, propose_boxes
 from .cells import HIGH, LOW, VOID
 from .frames import lower_storeys
+from .workers import ALONE, Workers
 
 __all__ = ["lower_superstructures"]
 
@@ -32,6 +33,8 @@ __all__ = ["lower_superstructures"]
 _LEDGE = 30
 #: Longest run of void cells that a tower's shadow leaves on a roof.
 _SHADOW = 12
+#: Cells that walls are eaten up by.
+_ROUNDS = 8
 
 
 def lower_superstructures(
@@ -43,6 +46,7 @@ def lower_superstructures(
     share: float,
     most: int,
     rounds: int = 5,
+    workers: Workers = ALONE,
 ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     """Return heights and states with superstructures lowered to the roofs that carry them, and their shadows filled.
 
@@ -61,15 +65,15 @@ def lower_superstructures(
         Cells that a rough place may have to count as furniture of the roof around it.
     rounds : int
         Towers on towers that are lowered.
+    workers : Workers
     """
     if share > 1:
         return height, state
-    lowered, state = _lower_storeys(height, state, roof, round(100 * step))
+    lowered, state = _lower_storeys(height, state, roof, round(100 * step), workers)
     for turn in range(rounds):
         labels, count = label_patches(lowered, roof, round(100 * step))
-        for _ in range(8 if turn == 0 else 0):
-            if not _smooth_walls(lowered, state, labels):
-                break
+        if turn == 0:
+            _smooth_walls(lowered, state, labels, _ROUNDS)
         if turn == 0 and _fill_rough(lowered, state, labels, share, most):
             labels, count = label_patches(lowered, labels > 0, round(100 * step))
         roof = labels > 0
@@ -79,19 +83,15 @@ def lower_superstructures(
 
 
 def _lower_storeys(
-    height: NDArray[np.int32], state: NDArray[np.uint8], roof: NDArray[np.bool_], step: int
+    height: NDArray[np.int32], state: NDArray[np.uint8], roof: NDArray[np.bool_], step: int, workers: Workers
 ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     """Return heights and states with the storeys of frames lowered."""
     smooth, lowered, filled = height.copy(), height.copy(), state.copy()
     labels, count = label_patches(smooth, _with_ledges(height, state, roof), step)
-    for _ in range(8):
-        if not _smooth_walls(smooth, state, labels):
-            break
+    _smooth_walls(smooth, state, labels, _ROUNDS)
+    jobs = ((_with_shadows(state), 1e6), (labels > 0, 0.01 * step))
     boxes = np.concatenate(
-        [
-            propose_boxes(smooth, _with_shadows(state), steps=(1e6,), least_cells=24),
-            propose_boxes(smooth, labels > 0, steps=(0.01 * step,), least_cells=24),
-        ]
+        workers.map(lambda job: propose_boxes(smooth, job[0], steps=(job[1],), least_cells=24), jobs)
     )
     boxes = boxes[np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")]
     lower_storeys(lowered, filled, labels, count, boxes, step)
@@ -146,31 +146,48 @@ def _with_ledges(height, state, roof):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _smooth_walls(height, state, labels):  # type: ignore[no-untyped-def]
+def _smooth_walls(height, state, labels, rounds):  # type: ignore[no-untyped-def]
     """Give rough high cells between labelled ones the label and height of the neighbour nearest in height, in place.
 
     A cell is taken when five of its eight neighbours are labelled, so that walls and furniture are eaten up from their
-    corners while the straight edge of a roof beside a crown stays. Return whether any cell was taken.
+    corners while the straight edge of a roof beside a crown stays. Each round goes by what the one before left.
     """
     rows, columns = state.shape
-    before, level = labels.copy(), height.copy()
-    found = False
+    free = 0
     for r in range(1, rows - 1):
         for c in range(1, columns - 1):
-            if before[r, c] != 0 or state[r, c] != HIGH:
-                continue
+            free += labels[r, c] == 0 and state[r, c] == HIGH
+    rough, taken = np.empty((free, 2), dtype=np.int32), np.empty((free, 4), dtype=np.int32)
+    free = 0
+    for r in range(1, rows - 1):
+        for c in range(1, columns - 1):
+            if labels[r, c] == 0 and state[r, c] == HIGH:
+                rough[free, 0], rough[free, 1] = r, c
+                free += 1
+    for _ in range(rounds):
+        left, found = 0, 0
+        for k in range(free):
+            r, c = rough[k, 0], rough[k, 1]
             known, nearest, label, carrier = 0, np.int64(1) << 40, 0, 0
             for i in range(r - 1, r + 2):
                 for j in range(c - 1, c + 2):
-                    if before[i, j] > 0:
+                    if labels[i, j] > 0:
                         known += 1
-                        gap = abs(np.int64(level[i, j]) - level[r, c])
+                        gap = abs(np.int64(height[i, j]) - height[r, c])
                         if gap < nearest:
-                            nearest, label, carrier = gap, before[i, j], level[i, j]
+                            nearest, label, carrier = gap, labels[i, j], height[i, j]
             if known >= 5:
-                labels[r, c], height[r, c] = label, carrier
-                found = True
-    return found
+                taken[found, 0], taken[found, 1], taken[found, 2], taken[found, 3] = r, c, label, carrier
+                found += 1
+            else:
+                rough[left] = rough[k]
+                left += 1
+        for k in range(found):
+            r, c = taken[k, 0], taken[k, 1]
+            labels[r, c], height[r, c] = taken[k, 2], taken[k, 3]
+        free = left
+        if found == 0:
+            break
 
 
 @njit(cache=True, nogil=True)

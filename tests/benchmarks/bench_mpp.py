@@ -1,35 +1,310 @@
-"""CPU time of the marked point process on the presets, JIT compilation excluded.
+"""Speed and memory of the marked point process: stages, proposals, quality against time, threads, bytes a cell.
 
-Run by hand: ``python tests/benchmarks/bench_mpp.py``.
+Run by hand: ``python tests/benchmarks/bench_mpp.py [stages] [moves] [budget] [threads] [memory]`` (all without names),
+``--scenes toronto-a,vaihingen-a --repeats 5 --plot docs/images/mpp-budget.png``.
 
-The median of three runs with one worker, from arrays in memory to rectangles, and the proposals of the chains.
+From arrays in memory to rectangles, after the kernels are compiled. CPU seconds of one thread where threads are not the
+subject, the median and the least of the repeats. Threads: wall seconds of one and of two threads in turn, side by side,
+so that what else the machine does hits both; the median ratio and that of the least times. Memory: the highest resident
+set during a detection less the resident set before it, which holds the scene, divided by the number of cells, in a
+process of its own. `+2x2` behind a name makes a mosaic of four copies.
 """
 
+from __future__ import annotations
+
+import argparse
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
+from collections import defaultdict
+from pathlib import Path
 
 import numpy as np
 
 import roofbench as rb
 
+STAGES = {
+    "cell size": ("preparation", "cell_size"),
+    "ground surface (no DEM)": ("preparation", "ground_surface"),
+    "points to cells": ("preparation", "make_cells"),
+    "classes by EM, textures": ("preparation", "estimate_background"),
+    "textures again": ("preparation", "textures"),
+    "scores": ("preparation", "score_cells"),
+    "superstructures": ("preparation", "lower_superstructures"),
+    "tables": ("preparation", "make_tables"),
+    "boxes": ("preparation", "propose_boxes"),
+    "energies of boxes": ("preparation", "own_energies"),
+    "polish of tiles": ("annealing", "polish"),
+    "chains": ("annealing", "run_chain"),
+    "polish of seams": ("city", "polish"),
+    "walls": ("city", "close_walls"),
+    "footprints": ("detector", "as_rectangles"),
+}
+EFFORTS = (0, 0.05, 0.1, 0.25, 0.5, 1, 2, 4)
 
-def main() -> None:
-    names = sys.argv[1:] or ["toronto-a", "vaihingen-a"]
-    rb.make_detector("mpp").detect(rb.make_scene("fairfield-small", seed=1), np.random.default_rng(0))
-    print("preset          points  CPU s  proposals  rectangles")
-    for name in names:
-        scene = rb.make_scene(name, seed=1)
-        points = scene.points
-        assert points is not None
-        scene = rb.Scene(name, scene.extent, crs=scene.crs, points=points, dem=scene.dem)
-        seconds = []
-        for _ in range(3):
+
+def scene_of(name):
+    """Return a preset without its reference and image, in memory, and its reference."""
+    name, _, tiles = name.partition("+")
+    scene = rb.make_scene(name, seed=1)
+    points, dem = scene.points, scene.dem
+    if tiles != "2x2":
+        return rb.Scene(name, scene.extent, crs=scene.crs, points=points, dem=dem), scene.reference
+    grid = dem.grid
+    wide, high = grid.columns * grid.gsd, grid.rows * grid.gsd
+    shifts = [(i * wide, j * high) for i in (0, 1) for j in (0, 1)]
+    cloud = rb.PointCloud(
+        np.concatenate([points.x + dx for dx, _ in shifts]),
+        np.concatenate([points.y + dy for _, dy in shifts]),
+        np.concatenate([points.z] * 4),
+        return_number=np.concatenate([points.return_number] * 4),
+        number_of_returns=np.concatenate([points.number_of_returns] * 4),
+    )
+    place = rb.Grid(grid.west, grid.north + high, grid.gsd, 2 * grid.rows, 2 * grid.columns)
+    west, south, _, _ = scene.extent
+    extent = (west, south, west + 2 * wide, south + 2 * high)
+    return rb.Scene(
+        name, extent, crs=scene.crs, points=cloud, dem=rb.Elevation(np.tile(dem.values, (2, 2)), place)
+    ), None
+
+
+def detect(scene, selection="mpp", seed=0):
+    return rb.make_detector(selection).detect(scene, np.random.default_rng(seed))
+
+
+def module(name):
+    import importlib
+
+    return importlib.import_module(f"roofbench.detectors.mpp.{name}")
+
+
+def stages(scenes, repeats):
+    seconds = defaultdict(float)
+
+    def timed(function, stage):
+        def call(*args, **named):
             began = time.process_time()
-            found = rb.make_detector("mpp").detect(scene, np.random.default_rng(0))
-            seconds.append(time.process_time() - began)
+            result = function(*args, **named)
+            seconds[stage] += time.process_time() - began
+            return result
+
+        return call
+
+    held = {stage: getattr(module(room), name) for stage, (room, name) in STAGES.items()}
+    for stage, (room, name) in STAGES.items():
+        setattr(module(room), name, timed(held[stage], stage))
+    for scene, _ in scenes:
+        runs, parts = [], []
+        for _ in range(repeats):
+            seconds.clear()
+            began = time.process_time()
+            found = detect(scene)
+            runs.append(time.process_time() - began)
+            parts.append(dict(seconds))
+        size, cell = len(scene.points), found.metadata["cell"]
         proposals = found.metadata["trace"]["proposals"][-1]
-        print(f"{name:14s} {len(points):8d} {statistics.median(seconds):6.2f} {proposals:10.0f} {len(found):11d}")
+        print(
+            f"\n{scene.name}: {size:,} points, cells of {cell:g} m, {len(found)} rectangles, {proposals:,.0f} proposals"
+        )
+        print(f"  all stages {statistics.median(runs):8.3f} s  (least {min(runs):.3f} s)")
+        for stage in STAGES:
+            if any(stage in part for part in parts):
+                print(f"  {stage:24s}{1e3 * statistics.median(part.get(stage, 0) for part in parts):7.1f} ms")
+    for stage, (room, name) in STAGES.items():
+        setattr(module(room), name, held[stage])
+
+
+def moves(scenes, repeats):
+    """Chains of the tile with most boxes, with the shares of the moves changed."""
+    annealing = module("annealing")
+    run_chain = annealing.run_chain
+    calls = []
+
+    def kept(*args):
+        calls.append((*args[:6], args[6].copy(), *args[7:]))
+        return run_chain(*args)
+
+    print("\nproposals a second of the tile with most boxes (shares of births + deaths, splits + merges; accepted)")
+    for scene, _ in scenes:
+        calls.clear()
+        annealing.run_chain = kept
+        detect(scene)
+        annealing.run_chain = run_chain
+        args = max(calls, key=lambda call: len(call[3].boxes))
+        mixes = {"as by default": args[11:13], "births and deaths": (0.98, 0.0), "splits and merges": (0.0, 0.98)}
+        mixes["shifts, edges, sides, turns"] = (0.0, 0.0)
+        for label, (jump, split) in mixes.items():
+            rates = []
+            for _ in range(repeats):
+                changed = [
+                    *args[:6],
+                    args[6].copy(),
+                    20000,
+                    *args[8:11],
+                    float(jump),
+                    float(split),
+                    *args[13:15],
+                    20000,
+                ]
+                began = time.process_time()
+                _, _, trace, _ = run_chain(*changed)
+                rates.append(20000 / (time.process_time() - began))
+            accepted = trace[:, 12:].sum() / trace[:, 4:12].sum()
+            rate = statistics.median(rates)
+            print(f"  {scene.name:14s}{label:30s}{rate:12,.0f}/s  ({jump:.2f}, {split:.2f}; {accepted:.1%})")
+
+
+def budget(scenes, repeats, plot):
+    evaluator = rb.make_evaluator("threshold-free")
+    print(
+        "\n| scene | effort | proposals | CPU s | energy | Q_l % | Q_lp % | M_d % |\n|---|--:|--:|--:|--:|--:|--:|--:|"
+    )
+    curves = {}
+    for scene, reference in scenes:
+        if reference is None:
+            continue
+        for effort in EFFORTS:
+            seconds, rows = [], []
+            for seed in range(repeats):
+                began = time.process_time()
+                found = detect(scene, f"mpp[effort={effort}]", seed)
+                seconds.append(time.process_time() - began)
+                result = evaluator.evaluate(found, reference)
+                shares = (result.object.quality, result.pixel.quality, result.object.multiple_detection_rate)
+                rows.append([found.metadata["energy"], *(100 * share for share in shares)])
+            energy, by_object, pixel, multiple = np.mean(rows, axis=0)
+            proposals, least = found.metadata["trace"]["proposals"][-1], min(seconds)
+            spread = np.std(np.array(rows)[:, 1:3], axis=0)
+            curves.setdefault(scene.name, []).append((least, by_object, pixel, *spread, effort))
+            print(
+                f"| {scene.name} | {effort:g} | {proposals:,.0f} | {least:.2f} | {energy:,.0f} | {by_object:.1f} "
+                f"| {pixel:.1f} | {multiple:.1f} |",
+                flush=True,
+            )
+    if plot:
+        draw(curves, plot)
+
+
+def draw(curves, path):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 3.6), layout="constrained")
+    panels = figure.subplots(1, 2)
+    for panel, column, title in zip(panels, (1, 2), ("object quality, %", "pixel quality, %"), strict=True):
+        for name, points in curves.items():
+            values = np.array(points)
+            panel.errorbar(
+                values[:, 0], values[:, column], yerr=values[:, column + 2], marker="o", capsize=2, label=name
+            )
+            for row in values:
+                if row[5] in (0, 0.25, 1, 4):
+                    place = (row[0], row[column])
+                    panel.annotate(f"{row[5]:g}", place, xytext=(3, 5), textcoords="offset points", fontsize=8)
+        panel.set_title(title, fontsize=10)
+        panel.set_xlabel("CPU seconds of one core")
+        panel.set_xlim(left=0)
+        panel.grid(alpha=0.3)
+    panels[1].legend(fontsize=8)
+    figure.savefig(path, dpi=100)
+
+
+def threads(scenes, repeats):
+    print("\nwall seconds of 1 and 2 threads in turn, and their ratio: median, best pair, least times; CPU seconds")
+    for scene, _ in scenes:
+        walls = {1: [], 2: []}
+        spent = {1: [], 2: []}
+        for count in (1, 2):
+            detect(scene, f"mpp[workers={count}]")
+        for _ in range(repeats):
+            for count in (1, 2):
+                began, cpu = time.perf_counter(), time.process_time()
+                detect(scene, f"mpp[workers={count}]")
+                walls[count].append(time.perf_counter() - began)
+                spent[count].append(time.process_time() - cpu)
+        ratios = [one / two for one, two in zip(walls[1], walls[2], strict=True)]
+        print(
+            f"  {scene.name:18s} {len(scene.points):10,d} points  least {min(walls[1]):.3f}, {min(walls[2]):.3f} s  "
+            f"ratio {statistics.median(ratios):.2f}, {max(ratios):.2f}, {min(walls[1]) / min(walls[2]):.2f}  CPU "
+            f"{min(spent[1]):.3f}, {min(spent[2]):.3f} s",
+            flush=True,
+        )
+
+
+def resident(key):
+    """Return VmRSS or VmHWM of this process, bytes."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith(key):
+            return int(line.split()[1]) * 1024
+    raise LookupError(key)
+
+
+def memory(folder):
+    """Measure one scene that lies in a folder as arrays; nothing else has been in this process."""
+    with np.load(Path(folder) / "scene.npz") as held:
+        arrays = dict(held)
+    names = ("x", "y", "z", "return_number", "number_of_returns")
+    points = rb.PointCloud(*(arrays[name] for name in names[:3]), **{name: arrays[name] for name in names[3:]})
+    place = arrays["place"]
+    dem = rb.Elevation(arrays["dem"], rb.Grid(*place[:3], int(place[3]), int(place[4])))
+    west, south, east, north = extent = tuple(arrays["extent"].tolist())
+    inside = (points.x < west + 60) & (points.y < south + 60)
+    corner = (west, south, west + 60, south + 60)
+    for ground in (dem, None):
+        detect(rb.Scene("corner", corner, crs="EPSG:25832", points=points.take(inside), dem=ground))
+    for ground in (dem, None):
+        scene = rb.Scene("whole", extent, crs="EPSG:25832", points=points, dem=ground)
+        before = resident("VmRSS")
+        Path("/proc/self/clear_refs").write_text("5")
+        cell = detect(scene).metadata["cell"]
+        used = resident("VmHWM") - before
+        cells = (east - west) * (north - south) / cell**2
+        kind = "without a DEM" if ground is None else "with a DEM"
+        print(
+            f"    {kind:14s}{cells:11,.0f} cells, {len(points):,} points: "
+            f"{used / 1e6:5.0f} MB = {used / cells:.1f} bytes a cell",
+            flush=True,
+        )
+
+
+def save(scene, folder):
+    points, dem = scene.points, scene.dem
+    grid = dem.grid
+    names = ("x", "y", "z", "return_number", "number_of_returns")
+    place = np.array([grid.west, grid.north, grid.gsd, grid.rows, grid.columns])
+    arrays = {name: getattr(points, name) for name in names}
+    np.savez(Path(folder) / "scene.npz", dem=dem.values, place=place, extent=np.array(scene.extent), **arrays)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", help="stages, moves, budget, threads, memory")
+    parser.add_argument("--scenes", default="toronto-a,vaihingen-a")
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--plot", help="where to save the picture of quality against time")
+    options = parser.parse_args()
+    parts = options.parts or ["stages", "moves", "budget", "threads", "memory"]
+    if parts == ["memory-of"]:
+        memory(options.scenes)
+        return
+    detect(scene_of("fairfield-small")[0])
+    scenes = [scene_of(name) for name in options.scenes.split(",")]
+    if "stages" in parts:
+        stages(scenes, options.repeats)
+    if "moves" in parts:
+        moves(scenes, options.repeats)
+    if "budget" in parts:
+        budget(scenes, options.repeats, options.plot)
+    if "threads" in parts:
+        threads(scenes, options.repeats)
+    if "memory" in parts:
+        print("\nhighest resident set of a detection beyond the scene")
+        for scene, _ in scenes:
+            print(f"  {scene.name}", flush=True)
+            with tempfile.TemporaryDirectory() as folder:
+                save(scene, folder)
+                subprocess.run([sys.executable, __file__, "memory-of", "--scenes", folder], check=True)
 
 
 if __name__ == "__main__":
