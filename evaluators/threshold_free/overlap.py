@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...scenes.errors import InputError
 from ...scenes.footprints import Footprints, polygonal_part
 from .convex import convex_intersection_areas
 
@@ -30,6 +31,9 @@ __all__ = [
 NUMERICAL_ZERO = 1e-6
 
 _CHUNK = 1 << 18
+
+#: Most pairs of footprints whose bounds meet: 5 GB and two minutes. A city has ten for each of its buildings.
+_MOST_PAIRS = 5e7
 
 #: Outlines of more vertices are cut into pieces where they take part in at least so many overlaps.
 _MANY_VERTICES = 512
@@ -73,6 +77,7 @@ def overlaps_between(detected: Footprints, reference: Footprints) -> Overlaps:
     if not len(detected) or not len(reference):
         return _measured(detected, reference, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
     tree = shapely.STRtree(reference.polygons)
+    _check_crowd(tree, detected)
     first, second = tree.query(detected.polygons)
     return _measured(detected, reference, first, second)
 
@@ -81,9 +86,30 @@ def overlaps_within(footprints: Footprints) -> Overlaps:
     """Return the pairs of one set that share area, each once, with first < second."""
     if len(footprints) < 2:
         return _measured(footprints, footprints, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
-    first, second = shapely.STRtree(footprints.polygons).query(footprints.polygons)
+    tree = shapely.STRtree(footprints.polygons)
+    _check_crowd(tree, footprints)
+    first, second = tree.query(footprints.polygons)
     once = first < second
     return _measured(footprints, footprints, first[once], second[once])
+
+
+def _check_crowd(tree: shapely.STRtree, footprints: Footprints) -> None:
+    """Raise `InputError` when so many footprints lie on each other that their pairs would fill the memory.
+
+    The number of pairs is estimated from footprints picked evenly, a few at a time.
+    """
+    if len(footprints) * len(tree) <= _MOST_PAIRS:
+        return
+    picked = np.unique(np.linspace(0, len(footprints) - 1, 4096).astype(np.int64))
+    found = 0
+    for start in range(0, len(picked), 16):
+        found += tree.query(footprints.polygons[picked[start : start + 16]]).shape[1]
+        pairs = found * len(footprints) / len(picked)
+        if pairs > _MOST_PAIRS:
+            raise InputError(
+                f"{footprints.source}: its {len(footprints)} footprints lie on each other or on others in more than "
+                f"{_MOST_PAIRS:,.0f} pairs: is it a stack of duplicates, or of candidates before their selection?"
+            )
 
 
 def shared_areas(
@@ -97,7 +123,10 @@ def shared_areas(
     for start in range(0, len(first), _CHUNK):
         part = slice(start, start + _CHUNK)
         quick = np.flatnonzero(convex[part]) + start
-        areas[quick] = convex_intersection_areas(corners_one[row_one[quick]], corners_two[row_two[quick]])
+        sides = corners_one[row_one[quick]], corners_two[row_two[quick]]
+        same = (sides[0] == sides[1]).all(axis=(1, 2))
+        areas[quick[same]] = one.areas[first[quick[same]]]
+        areas[quick[~same]] = convex_intersection_areas(sides[0][~same], sides[1][~same])
         slow = np.flatnonzero(~convex[part]) + start
         areas[slow] = _overlay_areas(one.polygons, two.polygons, first[slow], second[slow])
     return areas
@@ -111,10 +140,12 @@ def _overlay_areas(
     An overlay costs as much as the larger outline has vertices. One outline around a whole quarter would be paid for
     at each of its houses, so it is cut into pieces first.
     """
-    areas = np.empty(len(first))
+    # Of all overlays that of an outline with itself is the dearest.
+    same = shapely.equals_exact(one[first], two[second], 0.0)
+    areas = np.where(same, shapely.area(one[first]), 0.0)
     vertices = shapely.get_num_coordinates(one[first]), shapely.get_num_coordinates(two[second])
-    lopsided = np.minimum(*vertices) <= _MANY_VERTICES
-    direct = np.ones(len(first), dtype=bool)
+    lopsided = ~same & (np.minimum(*vertices) <= _MANY_VERTICES)
+    direct = ~same
     for large, others, large_row, other_row, count in (
         (one, two, first, second, vertices[0]),
         (two, one, second, first, vertices[1]),
