@@ -54,7 +54,8 @@ def sample_city(parameters: MPP, prepared: Prepared, seed: int, workers: Workers
         boxes = prepared.boxes[tile.owns(prepared.boxes)]
         fixed = _within_reach(fixed, tile, model.largest_side)
         window = np.array(tile.window)
-        best, _ = polish(tables.small, tables.large, model, window, own, fixed, boxes, len(own) + 64, 4)
+        sweeps = min(parameters.sweeps, 4)
+        best, _ = polish(tables.small, tables.large, model, window, own, fixed, boxes, len(own) + 64, sweeps)
         return best  # type: ignore[no-any-return]
 
     tiles = tiles_of(grid, size)
@@ -80,6 +81,7 @@ def _schedule(parameters: MPP, tile: Tile, cell: float, boxes: int) -> Schedule:
         data_share=parameters.data_births,
         merge_reach=20.0 / cell,
         greedy=parameters.start == "greedy",
+        sweeps=parameters.sweeps,
     )
 
 

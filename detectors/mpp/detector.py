@@ -107,6 +107,7 @@ class MPP(Detector):
     )
     start: str = parameter("greedy", choices=("greedy", "empty"), doc="first state of the chain")
     effort: float = parameter(0.25, minimum=0, doc="factor of the number of proposals", swept=(0, 0.25, 1, 4))
+    sweeps: int = parameter(6, minimum=0, doc="sweeps of a polish, at most; 0: the chain starts empty and is all")
     hot: float = parameter(3.0, minimum=1e-3, doc="first temperature", swept=(1, 3, 10, 30))
     cold: float = parameter(0.1, minimum=1e-4, doc="last temperature")
     intensity: float = parameter(

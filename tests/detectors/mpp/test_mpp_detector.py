@@ -116,6 +116,44 @@ def test_nothing_is_found_where_no_building_is(points):
     assert len(make_detector("mpp").detect(Scene("no DEM", EXTENT, points=points), np.random.default_rng(0))) == 0
 
 
+@pytest.mark.parametrize("dem", [True, False], ids=["DEM", "own ground"])
+def test_on_a_lake_nothing_is_found_and_the_house_on_its_shore_is(dem):
+    """Water gives few returns, some of them far below: the surface must neither break nor bring forth buildings."""
+    points = cloud(8, trees=())
+    rng = np.random.default_rng(3)
+    wet = points.y > 2070
+    z = np.where(wet, 3.0 + rng.normal(0, 0.05, len(points)), points.z)
+    z = np.where(wet & (rng.random(len(points)) < 0.02), -6.0, z)
+    lake = replace(points, z=z).take(~wet | (rng.random(len(points)) < 0.03))
+    shore = Scene("lake", EXTENT, points=lake, dem=scene(lake).dem if dem else None)
+    found = make_detector("mpp").detect(shore, np.random.default_rng(0))
+    assert len(found) == 3
+    assert (shapely.bounds(found.polygons)[:, 3] < 2065).all()
+    water = Scene("water", (1000.0, 2072.0, 1120.0, 2090.0), points=lake.take(lake.y > 2072))
+    assert len(make_detector("mpp").detect(water, np.random.default_rng(0))) == 0
+
+
+@pytest.mark.parametrize("size", [(3.6, 3.0), (100.0, 60.0)], ids=["shed of 11 m2", "hall of 100 m"])
+@pytest.mark.parametrize("dem", [True, False], ids=["DEM", "own ground"])
+def test_sheds_and_halls_on_a_slope_are_found_with_their_size(size, dem):
+    rng = np.random.default_rng(11)
+    extent = (0.0, 0.0, 170.0, 130.0)
+    n = 8 * 170 * 130
+    x, y = rng.uniform(0, 170, n), rng.uniform(0, 130, n)
+    truth = shapely.box(40.3, 30.2, 40.3 + size[0], 30.2 + size[1])
+    on = shapely.contains_xy(truth, x, y)
+    floor = 20.0 + 0.08 * (truth.centroid.x - x) if size[0] < 10 else np.full(n, 20.0)
+    z = np.where(on, floor + (2.8 if size[0] < 10 else 9.0), 20.0 + 0.08 * (truth.centroid.x - x))
+    points = PointCloud(x, y, z + rng.normal(0, 0.03, n))
+    grid = Grid.covering(extent, 1.0)
+    east, _ = grid.to_world(*np.meshgrid(np.arange(grid.rows) + 0.5, np.arange(grid.columns) + 0.5, indexing="ij"))
+    ground = Elevation((20.0 + 0.08 * (truth.centroid.x - east)).astype(np.float32), grid) if dem else None
+    found = make_detector("mpp").detect(Scene("slope", extent, points=points, dem=ground), rng)
+    assert len(found) == 1
+    common = found.polygons[0].intersection(truth).area
+    assert common / found.polygons[0].union(truth).area > (0.6 if size[0] < 10 else 0.95)
+
+
 def test_birds_holes_and_broken_points_change_little():
     points = cloud(4)
     expected = detect(points)

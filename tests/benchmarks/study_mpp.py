@@ -1,0 +1,311 @@
+"""How the result of the marked point process moves: the tables and figures of docs/mpp.md.
+
+Run by hand: ``python tests/benchmarks/study_mpp.py ablation --folders delft,ign`` and the same with ``sensitivity``,
+``points``, ``seeds``, ``ground``, ``detectors`` or ``shapes``; figures go to docs/images.
+
+Small presets of two scene seeds (one chain each) and the real scenes in folders (three chains). Q_l is object quality
+of the rectangles, Q_lp pixel quality, both in percent by the threshold-free evaluator (nearest matching, exact areas);
+of a real scene Q_lp is that of blocks (``outline=blocks``) against the reference joined over gaps below 0.1 m. The
+detector never sees classes, and sees no image.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+import roofbench as rb
+
+IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
+PRESETS = ("vaihingen-a-small", "toronto-a-small", "knox-small")
+ABLATIONS = {
+    "as it is": "",
+    "the printed algorithm": "mode=paper",
+    "births uniform, greedy start": "data_births=0",
+    "births from data, empty start": "start=empty",
+    "births uniform, empty start": "data_births=0,start=empty",
+    "the same, 16 times the proposals": "data_births=0,start=empty,effort=4",
+    "no chain: greedy start and polish": "effort=0",
+    "no polish: empty start, chain alone": "sweeps=0",
+    "the same, 16 times the proposals ": "sweeps=0,effort=4",
+    "no splits and merges in the chain": "split_share=0",
+    "flat roofs alone": "roofs=flat",
+    "no texture": "texture_weight=0",
+    "no superstructures": "carried_share=1.1",
+    "furniture is not levelled": "furniture=0",
+    "the ground is known exactly": "ground_error=0",
+    "overlap is free": "overlap=0",
+}
+FACTORS = (0.5, 0.7, 1.4, 2.0)
+NUMBERS = (
+    "price", "fit_weight", "least_tau", "low_price", "void_price", "texture_weight", "texture_limit", "least_height",
+    "least_side", "roof_price", "roof_step", "overlap", "ground_error", "furniture", "effort", "hot", "intensity",
+    "tile",
+)  # fmt: skip
+OTHERS = {
+    "carried_share": (0.5, 0.58, 0.8, 1.0),
+    "cell": (0.5, 0.6, 0.75, 1.0),
+    "largest_side": (40.0, 60.0, 90.0, 150.0),
+    "jump_share": (0.1, 0.2, 0.45, 0.6),
+    "split_share": (0.0, 0.05, 0.2, 0.4),
+    "data_births": (0.0, 0.5, 0.8, 0.95),
+}
+
+
+class Case:
+    """Scenes that share a column of a table."""
+
+    def __init__(self, name, scenes, chains):
+        self.name, self.scenes, self.chains = name, scenes, chains
+
+    @property
+    def real(self):
+        return self.chains > 1
+
+    def quality(self, change="", points=None, *, dem=True):
+        """Return mean object and pixel quality over scenes and chains, percent; `points` maps a cloud to another."""
+        rows = []
+        for scene in self.scenes:
+            cloud = scene.points.unclassified() if points is None else points(scene.points.unclassified())
+            seen = rb.Scene(scene.name, scene.extent, crs=scene.crs, points=cloud, dem=scene.dem if dem else None)
+            for chain in range(self.chains):
+                rows.append(indices(scene, seen, change, chain, real=self.real))
+        return np.nanmean(np.array(rows, dtype=float), axis=0)
+
+
+def indices(scene, seen, change, chain, *, real):
+    found = detect(seen, change, chain)
+    result = rb.evaluate(found, scene.reference, area=scene.area)
+    by_object, pixel = result.object.quality, result.pixel.quality
+    if real:
+        blocks = detect(seen, ",".join(filter(None, (change, "outline=blocks"))), chain)
+        pixel = rb.evaluate(blocks, scene.reference.joined(0.1), area=scene.area).pixel.quality
+    return 100 * (by_object or 0), 100 * (pixel or 0)
+
+
+def detect(seen, change, chain):
+    return rb.make_detector(f"mpp[{change}]").detect(seen, np.random.default_rng(chain))
+
+
+@cache
+def scene_of(name, seed):
+    return rb.make_scene(name, seed=seed)
+
+
+def cases(folders, presets=PRESETS, seeds=(1, 2)):
+    made = [Case(name, [scene_of(name, seed) for seed in seeds], 1) for name in presets]
+    return made + [Case(Path(folder).name, [rb.open_scene(folder)], 3) for folder in folders]
+
+
+def head(chosen, first):
+    print(f"\n| {first} | " + " | ".join(f"{case.name} Q_l | Q_lp" for case in chosen) + " |")
+    print("|---" + "|--:" * (2 * len(chosen)) + "|")
+
+
+def line(label, values, base=None):
+    pairs = np.ravel(values) if base is None else np.ravel(values) - np.ravel(base)
+    text = (f"{value:.1f}" if base is None else f"{value:+.1f}" for value in pairs)
+    print(f"| {label.strip()} | " + " | ".join(text) + " |", flush=True)
+
+
+def ablation(folders):
+    chosen = cases(folders)
+    head(chosen, "change")
+    base = None
+    for label, change in ABLATIONS.items():
+        values = [case.quality(change) for case in chosen]
+        line(label, values, base)
+        base = values if base is None else base
+
+
+def sensitivity(folders):
+    """Change of quality with each parameter: the range over its values, per scene; a bar each in the figure."""
+    chosen = cases(folders)
+    defaults = rb.make_detector("mpp").values()
+    base = np.array([case.quality() for case in chosen])
+    sweeps = {name: tuple(round(defaults[name] * factor, 6) for factor in FACTORS) for name in NUMBERS} | OTHERS
+    rows = {}
+    for name, values in sweeps.items():
+        found = np.array([[case.quality(f"{name}={value}") for case in chosen] for value in values])
+        rows[name] = found - base
+        default = "automatic" if defaults[name] is None else f"{defaults[name]:g}"
+        mean = rows[name].mean(axis=1)
+        cells = (f"{value:g}: {change[0]:+.1f}, {change[1]:+.1f}" for value, change in zip(values, mean, strict=True))
+        print(f"| `{name}` | {default} | " + " | ".join(cells) + " |", flush=True)
+    draw_sensitivity(rows, [case.name for case in chosen])
+
+
+def draw_sensitivity(rows, names):
+    from matplotlib.figure import Figure
+
+    order = sorted(rows, key=lambda name: np.ptp(rows[name][:, :, 0], axis=0).mean())
+    figure = Figure(figsize=(10, 7), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for panel, column, title in zip(panels, (0, 1), ("object quality", "pixel quality"), strict=True):
+        for k, scene in enumerate(names):
+            offset = 0.8 * ((k + 0.5) / len(names) - 0.5)
+            for place, name in enumerate(order):
+                change = rows[name][:, k, column]
+                ends = min(change.min(), 0), max(change.max(), 0)
+                panel.plot(ends, [place - offset] * 2, color=f"C{k}", linewidth=2.5, solid_capstyle="butt",
+                           label=scene if place == 0 else None)  # fmt: skip
+        panel.axvline(0, color="black", linewidth=0.8)
+        panel.set_xlabel(f"change of {title}, percent points")
+        panel.grid(axis="x", alpha=0.3)
+        for place in range(1, len(order), 2):
+            panel.axhspan(place - 0.5, place + 0.5, color="0.95", zorder=0)
+    panels[0].set_yticks(range(len(order)), order)
+    panels[0].set_ylim(-0.5, len(order) - 0.5)
+    panels[1].legend(fontsize=8, loc="lower right")
+    figure.savefig(IMAGES / "mpp-sensitivity.png", dpi=90)
+
+
+def thinned(density):
+    def thin(cloud):
+        places = np.floor(np.column_stack([cloud.x, cloud.y]) / 2)
+        covered = 4.0 * len(np.unique(places, axis=0))
+        keep = np.random.default_rng(5).random(len(cloud)) < density * covered / len(cloud)
+        return cloud.take(keep)
+
+    return thin
+
+
+def untold(cloud):
+    return replace(cloud, return_number=None, number_of_returns=None)
+
+
+def first(cloud):
+    return cloud.take(cloud.return_number == 1)
+
+
+def last(cloud):
+    return cloud.take(cloud.return_number == cloud.number_of_returns)
+
+
+def points(folders):
+    chosen = cases(folders, presets=())
+    variants = {"all returns": None} | {f"{density} points per m2": thinned(density) for density in (15, 8, 3, 1.5)}
+    variants |= {"first returns": first, "last returns": last, "return numbers unknown": untold}
+    variants |= {
+        "first returns, numbers unknown, 3 per m2": lambda cloud: thinned(3)(untold(first(cloud))),
+        "last returns, numbers unknown, 3 per m2": lambda cloud: thinned(3)(untold(last(cloud))),
+    }
+    head(chosen, "points (no DEM)")
+    for label, change in variants.items():
+        line(label, [case.quality(points=change, dem=False) for case in chosen])
+
+
+def seeds(folders):
+    print("\n| scene | chains | Q_l: mean, least, most, sd | Q_lp: mean, least, most, sd |\n|---|--:|---|---|")
+    for case in cases(folders, seeds=(1,)):
+        scene = case.scenes[0]
+        seen = rb.Scene(scene.name, scene.extent, crs=scene.crs, points=scene.points.unclassified(), dem=scene.dem)
+        rows = np.array([indices(scene, seen, "", chain, real=case.real) for chain in range(12)])
+        text = (f"{v.mean():.1f}, {v.min():.1f}, {v.max():.1f}, {v.std(ddof=1):.2f}" for v in rows.T)
+        print(f"| {case.name} | {len(rows)} | " + " | ".join(text) + " |", flush=True)
+
+
+def ground(folders):
+    chosen = cases(folders, presets=("toronto-a", "vaihingen-a", "knox", "moonee-ponds"), seeds=(1,))
+    head(chosen, "ground")
+    line("DEM of the scene", [case.quality() for case in chosen])
+    line("own ground surface", [case.quality(dem=False) for case in chosen])
+
+
+def detectors(_folders):
+    """Mean of three scene seeds: the process sees points and DEM, the others the image as well."""
+    presets = ("fairfield-1", "fairfield-2", "fairfield-3", "knox", "moonee-ponds")
+    print("\n| preset | detector | C_m % | C_r % | Q_l % | M_d % | Q_lp % |\n|---|---|--:|--:|--:|--:|--:|")
+    for preset in presets:
+        scenes = [scene_of(preset, seed) for seed in (1, 2, 3)]
+        for name in ("mpp", "ndsm", "original", "improved"):
+            rows = []
+            for scene in scenes:
+                found = rb.make_detector(name).detect(scene.for_detection(), np.random.default_rng(0))
+                result = rb.evaluate(found, scene.reference)
+                shares = result.object.completeness, result.object.correctness, result.object.quality
+                shares += result.object.multiple_detection_rate, result.pixel.quality
+                rows.append([100 * (share or 0) for share in shares])
+            print(f"| {preset} | {name} | " + " | ".join(f"{v:.1f}" for v in np.mean(rows, axis=0)) + " |", flush=True)
+
+
+def best_rectangle(polygon):
+    """Return the rectangle with the largest intersection over union with a polygon, by descent, and that share."""
+    outline = np.array(shapely.minimum_rotated_rectangle(polygon).exterior.coords)[:4]
+    along, across = outline[1] - outline[0], outline[3] - outline[0]
+    middle = outline.mean(axis=0)
+    now = np.array([*middle, np.hypot(*along), np.hypot(*across), np.arctan2(along[1], along[0])])
+
+    def made(values):
+        x, y, a, b, angle = values
+        box = shapely.affinity.rotate(shapely.box(-a / 2, -b / 2, a / 2, b / 2), angle, use_radians=True, origin=(0, 0))
+        return shapely.affinity.translate(box, x, y)
+
+    def share(values):
+        box = made(values)
+        common = box.intersection(polygon).area
+        return common / (box.area + polygon.area - common)
+
+    best, step = share(now), 2.0
+    while step > 0.05:
+        moved = False
+        u, v = np.array([np.cos(now[4]), np.sin(now[4])]), np.array([-np.sin(now[4]), np.cos(now[4])])
+        moves = [np.array([*(0.5 * s * step * u), t * step, 0, 0]) for s in (-1, 1) for t in (-1, 1)]
+        moves += [np.array([*(0.5 * s * step * v), 0, t * step, 0]) for s in (-1, 1) for t in (-1, 1)]
+        moves += [np.array([0, 0, 0, 0, s * step / max(now[2], now[3])]) for s in (-1, 1)]
+        for change in moves:
+            if (now + change)[2:4].min() > 0.5 and share(now + change) > best + 1e-6:
+                now, best, moved = now + change, share(now + change), True
+        if not moved:
+            step /= 2
+    return made(now), best
+
+
+def shapes(folders):
+    """What rectangles could reach at best: one for each reference footprint, as if the detector were perfect."""
+    print(
+        "\n| scene | footprints | area / bounding rectangle: median | best IoU: median | below 0.8 | below 0.6 |",
+        end="",
+    )
+    print(" Q_l % at best | Q_lp % at best |\n|---|--:|--:|--:|--:|--:|--:|--:|")
+    for folder in folders:
+        scene = rb.open_scene(folder)
+        polygons = scene.reference.polygons
+        filled = shapely.area(polygons) / shapely.area(shapely.minimum_rotated_rectangle(polygons))
+        boxes, shares = zip(*(best_rectangle(polygon) for polygon in polygons), strict=True)
+        shares = np.array(shares)
+        result = rb.evaluate(rb.Footprints.of(boxes, crs=scene.crs), scene.reference, area=scene.area)
+        print(
+            f"| {Path(folder).name} | {len(polygons)} | {np.median(filled):.2f} | {np.median(shares):.2f} | "
+            f"{(shares < 0.8).mean():.0%} | {(shares < 0.6).mean():.0%} | {100 * result.object.quality:.1f} | "
+            f"{100 * result.pixel.quality:.1f} |",
+            flush=True,
+        )
+
+
+STUDIES = {
+    "ablation": ablation,
+    "sensitivity": sensitivity,
+    "points": points,
+    "seeds": seeds,
+    "ground": ground,
+    "detectors": detectors,
+    "shapes": shapes,
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("study", choices=tuple(STUDIES))
+    parser.add_argument("--folders", default="", help="scene folders with a reference, by commas")
+    options = parser.parse_args()
+    STUDIES[options.study]([folder for folder in options.folders.split(",") if folder])
+
+
+if __name__ == "__main__":
+    main()
