@@ -129,7 +129,8 @@ class IsolatedProcess:
             environment = {**os.environ, **THREAD_LIMITS, "PYTHONPATH": path}
             self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
-                [sys.executable, "-X", "faulthandler", "-c", _START],
+                # -P: what lies in the working directory must not come before the path given, --time sets old code there
+                [sys.executable, "-P", "-X", "faulthandler", "-c", _START],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,

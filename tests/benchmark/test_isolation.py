@@ -65,6 +65,17 @@ def test_what_a_detector_prints_does_not_disturb_the_answer(process, task_of):
     assert call(process, task_of("prints")).status == "ok"
 
 
+def test_files_in_the_working_directory_do_not_replace_modules(task_of, tmp_path, monkeypatch):
+    (tmp_path / "roofbench").mkdir()
+    (tmp_path / "roofbench" / "__init__.py").write_text("raise SystemExit('the wrong code')")
+    monkeypatch.chdir(tmp_path)
+    process = IsolatedProcess()
+    try:
+        assert call(process, task_of()).status == "ok"
+    finally:
+        process.close()
+
+
 def test_numeric_libraries_get_one_thread_each(process, task_of):
     call(process, task_of())
     import psutil
