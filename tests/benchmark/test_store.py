@@ -12,7 +12,7 @@ from roofbench.benchmark.plan import Judge
 from roofbench.benchmark.recipes import PluginRecipe, SceneRecipe
 from roofbench.benchmark.records import RunIdentity
 from roofbench.benchmark.runner import score_stored
-from roofbench.benchmark.schema import VERSION
+from roofbench.benchmark.schema import MIGRATIONS, VERSION
 from roofbench.benchmark.store import Store
 from roofbench.benchmark.tasks import Outcome
 from roofbench.benchmark.worker import execute
@@ -143,6 +143,45 @@ def test_a_file_that_is_no_store_or_a_newer_one_is_refused(tmp_path):
         Store(tmp_path / "newer.sqlite")
     with pytest.raises(InputError, match="no such results store"):
         Store(tmp_path / "absent.sqlite", must_exist=True)
+
+
+def test_a_store_of_the_first_version_is_migrated_with_what_it_holds(tmp_path, outcome, judge):
+    path = tmp_path / "old.sqlite"
+    with Store(path) as store:
+        run_id = store.record(identity(), outcome, version="1")
+    old = sqlite3.connect(path)
+    old.executescript("ALTER TABLE scenes DROP COLUMN point_count; DROP TABLE scene_pictures; PRAGMA user_version = 1")
+    old.close()
+    with Store(path) as store:
+        assert store.count_runs() == 1
+        scene = store.scene(store.run(run_id).scene_id)
+        assert scene.point_count is None
+        assert store.scene_picture(scene.id) is None
+        assert len(store.detections(run_id)) == len(outcome.detections)
+        assert store.index_values([run_id], judge.key)[run_id]
+        store.record(identity(seed=1), outcome, version="2")
+    db = sqlite3.connect(path)
+    assert db.execute("PRAGMA user_version").fetchone() == (VERSION,)
+    db.close()
+
+
+def test_every_migration_leads_to_the_schema_of_a_new_store(tmp_path):
+    def schema(path):
+        db = sqlite3.connect(path)
+        columns = {
+            (table, *column[1:3])
+            for (table,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
+            for column in db.execute(f"PRAGMA table_info({table})").fetchall()
+        }
+        db.close()
+        return columns
+
+    Store(tmp_path / "new.sqlite").close()
+    first = sqlite3.connect(tmp_path / "first.sqlite")
+    first.executescript(MIGRATIONS[0] + "PRAGMA user_version = 1")
+    first.close()
+    Store(tmp_path / "first.sqlite").close()
+    assert schema(tmp_path / "first.sqlite") == schema(tmp_path / "new.sqlite")
 
 
 WRITE = """
