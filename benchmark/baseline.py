@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from ..evaluators.base import Evaluator
-from ..scenes.errors import InputError, ParameterError
+from ..scenes.errors import InputError, ParameterError, UnknownNameError
+from ..scenes.names import nearest_hint
 from ..scenes.output import whole_file
 from .plan import Judge
 from .provenance import CodeVersion
@@ -114,7 +115,13 @@ class Baseline:
         return replace(self, detectors={named.get(label, label): found for label, found in self.detectors.items()})
 
     def only(self, labels: Iterable[str]) -> Baseline:
-        """Return this one with these detectors only."""
+        """Return this one with these detectors only, or raise `UnknownNameError`."""
+        for label in (labels := list(labels)):
+            if label not in self.detectors:
+                raise UnknownNameError(
+                    f"the baseline has no detector {label!r}{nearest_hint(label, self.detectors)}; "
+                    f"it has {', '.join(self.detectors)}"
+                )
         return replace(self, detectors={label: self.detectors[label] for label in labels})
 
     def with_scenes(self, pattern: str) -> Baseline:

@@ -87,6 +87,9 @@ def gate(
     ] = None,
     suite: Annotated[str | None, typer.Option(help="Suite to measure instead of the baseline's own.")] = None,
     detector: DetectorOption = None,
+    against: Annotated[
+        str | None, typer.Option(help="Detector of the baseline that the one of -d is compared with.", metavar="NAME")
+    ] = None,
     scenes: ScenesOption = None,
     index: Annotated[list[str] | None, typer.Option(help="Index to gate; repeat for more.")] = None,
     margin: Annotated[
@@ -109,8 +112,8 @@ def gate(
 ) -> None:
     """Say by paired tests over scenes whether a change has made a detector better or worse.
 
-    With -d only the detectors that it names are compared, each with the one of the same name in the baseline, with
-    --scenes only the scenes of that pattern.
+    With -d only the detectors that it names are compared, each with the one of the same name in the baseline or with
+    the one that --against names; with --scenes only the scenes of that pattern.
 
     Exit code 1 when an index became worse or a run fails that did not, 4 when nothing could be measured or the scenes
     are not the same, else 0.
@@ -124,6 +127,8 @@ def gate(
     before = Baseline.load(baseline)
     if scenes is not None:
         before = before.with_scenes(scenes)
+    if against is not None:
+        before = before.only([against])
     judge = before.evaluator.evaluator()
     indices = gated_indices(judge, index)
     margins = margins_of(margin or [], indices)
@@ -167,7 +172,10 @@ def _named(before: Baseline, selections: list[str]) -> tuple[Baseline, tuple[Ent
     known = before.counterparts(list(detectors))
     for label in detectors:
         if label not in known:
-            raise UnknownNameError(f"the baseline has no detector {label!r}; it has {', '.join(before.detectors)}")
+            raise UnknownNameError(
+                f"the baseline has no detector {label!r}; it has {', '.join(before.detectors)}: say with --against "
+                "which one it is compared with"
+            )
     entrants = (Entrant(detector, before.detectors[known[label]].seeds) for label, detector in detectors.items())
     return before.only(known.values()), tuple(entrants)
 

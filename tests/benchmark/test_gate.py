@@ -264,6 +264,10 @@ def test_only_the_detectors_that_are_named_are_compared(cli, misbehaving, tmp_pa
     assert "misbehaving" not in one.stdout
     with pytest.raises(RoofbenchError, match="has no detector 'original'; it has misbehaving, ndsm, "):
         cli("gate", "b.json", "-d", "original", "-j", 0)
+    with pytest.raises(RoofbenchError, match=r"has no detector 'nsdm'.*did you mean 'ndsm'"):
+        cli("gate", "b.json", "-d", "original", "--against", "nsdm", "-j", 0)
+    other = cli("gate", "b.json", "-d", "original", "--against", "ndsm", "-j", 0)
+    assert other.stdout.count("\nndsm ") == 5
     sides = [f"{misbehaving}[side={side}]" for side in (7, 9)]
     with pytest.raises(RoofbenchError, match="can be compared with one only"):
         cli("gate", "b.json", "-d", sides[0], "-d", sides[1], "-j", 0)
