@@ -14,7 +14,7 @@ from roofbench.benchmark.gate import compare_detector, gated_indices, margins_of
 from roofbench.benchmark.recipes import PluginRecipe
 from roofbench.evaluators.registry import make_evaluator
 
-SCENES = (6, 8, 10, 12, 16, 24, 32, 48)
+SCENES = (8, 10, 12, 16, 24, 30, 48)
 DROPS = (0.0, 0.01, 0.015, 0.02, 0.03, 0.05)
 SPREADS = (0.01, 0.02)
 REPEATS = 200
