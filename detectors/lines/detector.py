@@ -43,6 +43,8 @@ PAPER_PIXEL = 0.15
 _OUTSET = 0.5
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
 _CURVE_STEP = 0.3
+#: Length of a side that is tested at a time, point spacings: the paper's 3 m at its spacing of 0.5 m.
+_EXTENSION_PART = 6.0
 #: Root mean square distance from its line at which a segment must have missed a corner, point spacings or pixels.
 _MISSED_CORNER = 0.5
 #: Threshold that no mean reaches: entropy is not used.
@@ -161,6 +163,11 @@ class LineDetector(Detector):
         0.7, minimum=0, maximum=1, swept=(0.6, 0.7, 0.8, 0.9), doc="least share of black in a step of that extension",
         source="2010, 3.3.2",
     )  # fmt: skip
+    extension_part: float | None = parameter(
+        None, unit="m", minimum=0.1,
+        doc="least length along a side that a step is tested in at a time; none: 6 point spacings; 1000: the whole side",
+        source="2010, 3.3.2: 3 m at a spacing of 0.5 m, and 3.3.3: the same technique for sides; reading",
+    )  # fmt: skip
     initial_width: float = parameter(
         1.5, unit="m", minimum=0.1, doc="width of a rectangle before it is extended", source="2010, 3.3.3"
     )
@@ -260,10 +267,12 @@ class LineDetector(Detector):
 
     def _growth(self, rasters: Rasters) -> Growth:
         stop = 0.8 * rasters.spacing if self.extension_stop is None else self.extension_stop
+        part = _EXTENSION_PART * rasters.spacing if self.extension_part is None else self.extension_part
         return Growth(
             step=self.extension / rasters.gsd,
             least_step=max(stop / rasters.gsd, 1.0),
             black_share=self.extension_black,
+            part=part / rasters.gsd,
             vegetation=self.vegetation_threshold,
             entropy=self._entropy_limit(),
         )

@@ -35,8 +35,9 @@ class Original(LineDetector):
         source="2010, 3.3.2",
     )
     adjustment_reference: str = parameter(
-        "any", choices=("any", "longer"),
-        doc="which lines a line is turned to: any near it, or only longer ones", source="2010, 3.3.2; reading",
+        "longer", choices=("longer", "any"),
+        doc="which lines a line is turned to: longer ones, for which the print sorts them by length, or any near it",
+        source="2010, 3.3.2; reading",
     )  # fmt: skip
 
     def run(self, rasters: Rasters) -> Trace:
