@@ -23,6 +23,12 @@ def rectangle(x: float, y: float, length: float, width: float, degrees: float = 
     return shapely.affinity.translate(turned, x, y)
 
 
+def corners_off(found: shapely.Polygon, truth: shapely.Polygon) -> float:
+    """Root mean square distance of the corners of two rectangles, as the evaluation measures it."""
+    distances = shapely.distance(shapely.points(truth.exterior.coords[:4]), shapely.MultiPoint(found.exterior.coords))
+    return float(np.sqrt(np.mean(distances**2)))
+
+
 @dataclass
 class SceneBuilder:
     """Ground at 10 m with houses and trees; points in a jittered grid, last pulses."""

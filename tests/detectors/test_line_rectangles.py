@@ -12,7 +12,7 @@ from roofbench.detectors.lines.final import FinalRules, extend_final_side, lies_
 from roofbench.detectors.lines.rectangles import INSIDE, TOO_NARROW, initial_rectangles, share_inside
 
 NONE = np.zeros((0, 1), dtype=np.int32)
-RULES = Growth(step=20.0, least_step=2.7, black_share=0.7, vegetation=48.0, entropy=0.0)
+RULES = Growth(step=20.0, least_step=2.7, black_share=0.7, part=20.0, vegetation=48.0, entropy=0.0)
 
 
 def line(x, y, degrees, length):
@@ -70,6 +70,19 @@ def test_a_line_is_extended_to_within_a_least_step_of_the_end_of_the_black():
     found = extend_lines(cover(black), RULES, line(100, 20, 0, 40)[None], 20.0)[0]
     assert 100 + found[U0] == pytest.approx(30, abs=2.7)
     assert 100 + found[U1] == pytest.approx(170, abs=2.7)
+
+
+def test_a_side_stops_at_a_court_that_takes_less_than_a_third_of_it():
+    black = np.zeros((120, 140), np.uint8)
+    black[20:100, 20:120] = 1
+    black[60:100, 60:84] = 0
+    box = line(70, 20, 0, 100)
+    box[V1] = 10.0
+    in_parts, as_a_whole = box.copy(), box.copy()
+    extend_rectangle(cover(black), RULES, in_parts)
+    extend_rectangle(cover(black), RULES._replace(part=1e6), as_a_whole)
+    assert 20 + in_parts[V1] == pytest.approx(60, abs=2.7)
+    assert 20 + as_a_whole[V1] == pytest.approx(100, abs=2.7)
 
 
 def test_extension_stops_at_vegetation_unless_its_texture_is_smooth():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from line_scenes import GREEN_ROOF, LEAVES, SceneBuilder, rectangle
+from line_scenes import GREEN_ROOF, LEAVES, SceneBuilder, corners_off, rectangle
 
 from roofbench.detectors.lines.original import Original
 from roofbench.detectors.registry import make_detector
@@ -17,18 +17,13 @@ def detect(scene, **parameters):
     return Original(**parameters).detect(scene.for_detection(), np.random.default_rng(0))
 
 
-def sides_off(found, truth):
-    """Largest distance between the boundaries of two rectangles."""
-    return shapely.hausdorff_distance(found.exterior, truth.exterior)
-
-
 @pytest.mark.parametrize("degrees", [0, 13, 30, 45, 58, 77])
 def test_a_clean_rectangular_house_is_found_within_a_pixel_at_any_orientation(degrees):
     builder = SceneBuilder().house(rectangle(30, 30, 15, 10, degrees))
     found = detect(builder.build())
     truth = builder.truth()[0]
     assert len(found) == 1
-    assert sides_off(found.polygons[0], truth) < 0.15 * np.sqrt(2)
+    assert corners_off(found.polygons[0], truth) < 0.15 * np.sqrt(2)
 
 
 def test_an_l_is_two_overlapping_rectangles():
@@ -39,6 +34,16 @@ def test_an_l_is_two_overlapping_rectangles():
     assert found.polygons[0].intersects(found.polygons[1])
     union = shapely.union_all(found.polygons)
     truth = builder.truth()[0]
+    assert union.intersection(truth).area / union.union(truth).area > 0.9
+
+
+def test_a_u_with_a_narrow_court_is_three_overlapping_rectangles():
+    wings = [rectangle(30, 25, 18, 10), rectangle(24.75, 32, 7.5, 8), rectangle(35.25, 32, 7.5, 8)]
+    builder = SceneBuilder().house(shapely.union_all(wings))
+    found = detect(builder.build())
+    truth = builder.truth()[0]
+    union = shapely.union_all(found.polygons)
+    assert len(found) == 3
     assert union.intersection(truth).area / union.union(truth).area > 0.9
 
 
