@@ -165,7 +165,7 @@ class LineDetector(Detector):
     )  # fmt: skip
     extension_part: float | None = parameter(
         None, unit="m", minimum=0.1,
-        doc="least length along a side that a step is tested in at a time; none: 6 point spacings; 1000: the whole side",
+        doc="least length of a side that is tested at a time; none: 6 point spacings; 1000: the whole side",
         source="2010, 3.3.2: 3 m at a spacing of 0.5 m, and 3.3.3: the same technique for sides; reading",
     )  # fmt: skip
     initial_width: float = parameter(
