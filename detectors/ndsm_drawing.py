@@ -12,6 +12,7 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from .base import Step
+from .scale_bar import add_scale_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,6 +74,7 @@ def _frame(axes: Axes, work: Work) -> None:
     axes.set_aspect("equal")
     axes.set_xticks([])
     axes.set_yticks([])
+    add_scale_bar(axes)
 
 
 def _show(axes: Axes, work: Work, raster: NDArray[Any], **style: Any) -> AxesImage:
@@ -101,15 +103,18 @@ def _cues(figure: Figure, work: Work) -> None:
         axes.set_axis_off()
     for axes, (name, said) in zip(panels, work.said.items(), strict=False):
         axes.set_axis_on()
-        _show(axes, work, np.where(work.high, said, np.nan), cmap="RdYlGn", vmin=-1, vmax=1)
+        drawn = _show(axes, work, np.where(work.high, said, np.nan), cmap="RdYlGn", vmin=-1, vmax=1)
         axes.set_title(name)
+    if work.said:
+        key = figure.colorbar(drawn, ax=panels, shrink=0.5, ticks=[-1, 0, 1])
+        key.ax.set_yticklabels(["roof", "undecided", "tree"])
 
 
 def _likeness(figure: Figure, work: Work) -> None:
     _size(figure, work)
     axes = figure.add_subplot()
     drawn = _show(axes, work, np.where(work.high, work.likeness, np.nan), cmap="RdYlGn", vmin=-1, vmax=1)
-    figure.colorbar(drawn, ax=axes, label="-1 roof ... +1 tree", shrink=0.8)
+    figure.colorbar(drawn, ax=axes, label="likeness: -1 roof, +1 tree", shrink=0.7)
 
 
 def _mask(figure: Figure, work: Work) -> None:

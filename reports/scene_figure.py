@@ -17,10 +17,11 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image as Bitmap
 
+from ..detectors.scale_bar import add_scale_bar
 from .inline_svg import shortened
 from .report_data import Overlay, SceneView, Side
 from .scene_picture import ScenePicture
-from .verdict_map import VERDICT_STYLE, add_scale_bar, outlines
+from .verdict_map import VERDICT_STYLE, outlines
 
 __all__ = ["overlay_figure"]
 

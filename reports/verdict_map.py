@@ -14,17 +14,18 @@ import shapely
 from matplotlib.collections import PathCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
+from ..detectors.scale_bar import add_scale_bar
 from ..evaluators.base import Evaluation, Verdicts
 from .evaluation_text import described, format_value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["VERDICT_STYLE", "add_scale_bar", "draw_verdicts", "outlines", "verdict_figure"]
+__all__ = ["VERDICT_STYLE", "draw_verdicts", "outlines", "verdict_figure"]
 
 #: Verdict to (colour, hatch, what it means).
 VERDICT_STYLE = {
@@ -143,20 +144,6 @@ def outlines(polygons: Iterable[Any]) -> Iterable[Outline]:
             vertices = np.concatenate(rings)
             codes = np.concatenate([_ring_codes(len(ring)) for ring in rings])
             yield Outline(vertices, codes)
-
-
-def add_scale_bar(axes: Axes) -> None:
-    """Draw a bar of a round length, about a fifth of the map's width, in the lower left corner."""
-    (xmin, xmax), (ymin, ymax) = axes.get_xlim(), axes.get_ylim()
-    width, height = xmax - xmin, ymax - ymin
-    target = width / 5
-    step = 10 ** math.floor(math.log10(target))
-    length = max(factor * step for factor in (1, 2, 5) if factor * step <= target)
-    x, y = xmin + 0.03 * width, ymin + 0.03 * height
-    axes.add_patch(Rectangle((x, y), length, 0.008 * height, color="black", zorder=6))
-    label = f"{length / 1000:g} km" if length >= 1000 else f"{length:g} m"
-    background = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.5}
-    axes.text(x + length / 2, y + 0.02 * height, label, ha="center", va="bottom", fontsize=9, zorder=6, bbox=background)
 
 
 def _ring_codes(count: int) -> NDArray[np.uint8]:

@@ -81,6 +81,8 @@ def draw_rectangles(
 
 def draw_convergence(trace: Mapping[str, Any], figure: Figure) -> None:
     """Draw energy, temperature, number of buildings and acceptance per move against the number of proposals."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     proposals = np.asarray(trace["proposals"])
     upper, middle, lower = figure.subplots(3, 1, sharex=True)
     upper.plot(proposals, trace["energy"], color="navy")
@@ -99,6 +101,9 @@ def draw_convergence(trace: Mapping[str, Any], figure: Figure) -> None:
         lower.plot(proposals, np.where(share > 0, share, np.nan), label=move, linewidth=1)
     if trace.get("tried"):
         lower.set_yscale("log")
-        lower.legend(ncol=4, fontsize=7)
+        lower.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        lower.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
+        lower.yaxis.set_minor_formatter(NullFormatter())
+        lower.legend(ncol=8, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.3), frameon=False)
     lower.set_ylabel("accepted share")
     lower.set_xlabel("proposals")
