@@ -100,7 +100,7 @@ class MPP(Detector):
         1.0, minimum=0, doc="weight of roughness and multiple returns as evidence", swept=(0, 0.5, 1.0)
     )
     texture_limit: float = parameter(3.0, minimum=0, doc="bound of that evidence, nats per m2", swept=(2, 3, 4))
-    low_price: float = parameter(3.0, minimum=0, doc="nats per m2 of low ground under a roof", swept=(2, 3, 4))
+    low_price: float = parameter(5.0, minimum=0, doc="nats per m2 of low ground under a roof", swept=(2, 3, 5, 8))
     void_price: float = parameter(0.1, minimum=0, doc="nats per m2 without points under a roof", swept=(0.05, 0.1, 0.3))
     data_births: float = parameter(
         0.9, minimum=0, maximum=0.99, doc="share of births proposed by the data; 0: uniform", swept=(0, 0.5, 0.9)
