@@ -77,7 +77,7 @@ def lower_superstructures(
         if turn == 0 and _fill_rough(lowered, state, labels, share, most):
             labels, count = label_patches(lowered, labels > 0, round(100 * step))
         roof = labels > 0
-        if not _lower(lowered, state, labels, count, share):
+        if not _lower(lowered, state, labels, count, share, round(100 * step)):
             break
     return lowered, state
 
@@ -192,79 +192,126 @@ def _smooth_walls(height, state, labels, rounds):  # type: ignore[no-untyped-def
 
 @njit(cache=True, nogil=True)
 def _fill_rough(height, state, labels, share, most):  # type: ignore[no-untyped-def]
-    """Level rough places that roof surrounds, in place: they take the lower half of its height; return whether any."""
+    """Level rough places that roof surrounds, in place; return whether there was any."""
     rows, columns = state.shape
     rough, count = label_patches(height, (state == HIGH) & (labels == 0), 1 << 30)
     size = np.zeros(count + 1, dtype=np.int64)
     rim = np.zeros(count + 1, dtype=np.int64)
-    roof = np.zeros((2, count + 1), dtype=np.int64)
-    level = np.zeros((2, count + 1), dtype=np.int64)
-    for half in range(2):
-        for r in range(rows):
-            for c in range(columns):
-                place = rough[r, c]
-                if place == 0:
-                    continue
-                size[place] += 1 - half
-                for side in range(4):
-                    i = r + (1 if side == 0 else (-1 if side == 1 else 0))
-                    j = c + (1 if side == 2 else (-1 if side == 3 else 0))
-                    if i < 0 or j < 0 or i >= rows or j >= columns:
-                        rim[place] += 1 - half
-                    elif rough[i, j] == 0 and state[i, j] != VOID:
-                        rim[place] += 1 - half
-                        if labels[i, j] > 0 and (half == 0 or height[i, j] <= level[0, place]):
-                            roof[half, place] += 1
-                            level[half, place] += height[i, j]
-        for place in range(1, count + 1):
-            if roof[half, place] > 0:
-                level[half, place] = level[half, place] // roof[half, place]
+    roof = np.zeros(count + 1, dtype=np.int64)
+    for r in range(rows):
+        for c in range(columns):
+            place = rough[r, c]
+            if place == 0:
+                continue
+            size[place] += 1
+            for side in range(4):
+                i = r + (1 if side == 0 else (-1 if side == 1 else 0))
+                j = c + (1 if side == 2 else (-1 if side == 3 else 0))
+                if i < 0 or j < 0 or i >= rows or j >= columns:
+                    rim[place] += 1
+                elif rough[i, j] == 0 and state[i, j] != VOID:
+                    rim[place] += 1
+                    roof[place] += labels[i, j] > 0
+    chosen = np.zeros((rows, columns), dtype=np.bool_)
     found = False
     for r in range(rows):
         for c in range(columns):
             place = rough[r, c]
-            if place > 0 and roof[1, place] > 0 and size[place] <= most and roof[0, place] >= share * rim[place]:
-                height[r, c] = level[1, place]
-                labels[r, c] = 1
+            if place > 0 and roof[place] > 0 and size[place] <= most and roof[place] >= share * rim[place]:
+                chosen[r, c] = True
                 found = True
+    if found:
+        _sink(height, labels, chosen, 1 << 20)
     return found
 
 
 @njit(cache=True, nogil=True)
-def _lower(height, state, labels, count, share):  # type: ignore[no-untyped-def]
-    """Lower the superstructures in place to the lower half of the roof at their rim; return whether there was any.
-
-    Cells that a wall stands in have any height between two roofs, so the mean of the whole rim would be too high.
-    """
+def _lower(height, state, labels, count, share, step):  # type: ignore[no-untyped-def]
+    """Lower the superstructures in place; return whether there was any."""
     rows, columns = state.shape
+    size = np.zeros(count + 1, dtype=np.int64)
+    level = np.zeros(count + 1, dtype=np.int64)
     rim = np.zeros(count + 1, dtype=np.int64)
-    below = np.zeros((2, count + 1), dtype=np.int64)
-    carried = np.zeros((2, count + 1), dtype=np.int64)
-    for half in range(2):
-        for r in range(rows):
-            for c in range(columns):
-                label = labels[r, c]
-                if label == 0:
-                    continue
-                for side in range(4):
-                    i = r + (1 if side == 0 else (-1 if side == 1 else 0))
-                    j = c + (1 if side == 2 else (-1 if side == 3 else 0))
-                    if i < 0 or j < 0 or i >= rows or j >= columns:
-                        rim[label] += 1 - half
-                    elif labels[i, j] != label and state[i, j] != VOID:
-                        rim[label] += 1 - half
-                        lower = labels[i, j] > 0 and height[i, j] < height[r, c]
-                        if lower and (half == 0 or height[i, j] <= carried[0, label]):
-                            below[half, label] += 1
-                            carried[half, label] += height[i, j]
-        for label in range(1, count + 1):
-            if below[half, label] > 0:
-                carried[half, label] = carried[half, label] // below[half, label]
+    below = np.zeros(count + 1, dtype=np.int64)
+    for r in range(rows):
+        for c in range(columns):
+            label = labels[r, c]
+            if label == 0:
+                continue
+            size[label] += 1
+            level[label] += height[r, c]
+            for side in range(4):
+                i = r + (1 if side == 0 else (-1 if side == 1 else 0))
+                j = c + (1 if side == 2 else (-1 if side == 3 else 0))
+                if i < 0 or j < 0 or i >= rows or j >= columns:
+                    rim[label] += 1
+                elif labels[i, j] != label and state[i, j] != VOID:
+                    rim[label] += 1
+                    below[label] += labels[i, j] > 0 and height[i, j] < height[r, c]
+    chosen = np.zeros((rows, columns), dtype=np.bool_)
     found = False
     for r in range(rows):
         for c in range(columns):
             label = labels[r, c]
-            if label > 0 and below[1, label] > 0 and below[0, label] >= share * rim[label]:
-                height[r, c] = min(height[r, c], carried[1, label])
+            if label > 0 and below[label] > 0 and below[label] >= share * rim[label]:
+                chosen[r, c] = True
                 found = True
+    if found:
+        _sink(height, labels, chosen, -step // 2)
     return found
+
+
+@njit(cache=True, nogil=True)
+def _sink(height, labels, chosen, above):  # type: ignore[no-untyped-def]
+    """Give chosen cells the height of the roof beside them, in place, from the rim inwards.
+
+    Roof counts that is at most `above` centimetres higher than the cell; a step of the roof below goes on under what
+    stands on it.
+    """
+    rows, columns = height.shape
+    queue = np.empty((np.count_nonzero(chosen), 2), dtype=np.int32)
+    waiting = chosen.copy()
+    size, done, end = 0, 0, 0
+    for r in range(rows):
+        for c in range(columns):
+            if chosen[r, c] and _beside(height, labels, chosen, waiting, r, c, above) >= 0:
+                queue[size, 0], queue[size, 1] = r, c
+                size += 1
+    for k in range(size):
+        chosen[queue[k, 0], queue[k, 1]] = False
+    while done < size:
+        # One ring at a time, so that no direction is favoured.
+        end = size
+        for k in range(done, end):
+            r, c = queue[k, 0], queue[k, 1]
+            beside = _beside(height, labels, chosen, waiting, r, c, above)
+            height[r, c] = -1 - (beside if beside >= 0 else height[r, c])
+        for k in range(done, end):
+            r, c = queue[k, 0], queue[k, 1]
+            height[r, c] = -1 - height[r, c]
+            waiting[r, c] = False
+            labels[r, c] = max(labels[r, c], 1)
+        for k in range(done, end):
+            r, c = queue[k, 0], queue[k, 1]
+            for i in range(max(r - 1, 0), min(r + 2, rows)):
+                for j in range(max(c - 1, 0), min(c + 2, columns)):
+                    if chosen[i, j]:
+                        chosen[i, j] = False
+                        queue[size, 0], queue[size, 1] = i, j
+                        size += 1
+        done = end
+
+
+@njit(cache=True, nogil=True)
+def _beside(height, labels, chosen, waiting, r, c, above):  # type: ignore[no-untyped-def]
+    """Mean height of the roof among a cell's eight neighbours, -1 when there is none."""
+    rows, columns = height.shape
+    total, many = 0, 0
+    own = height[r, c]
+    for i in range(max(r - 1, 0), min(r + 2, rows)):
+        for j in range(max(c - 1, 0), min(c + 2, columns)):
+            if labels[i, j] > 0 and not waiting[i, j] and not chosen[i, j] and height[i, j] >= 0:
+                if height[i, j] <= own + above:
+                    total += height[i, j]
+                    many += 1
+    return total // many if many > 0 else -1
