@@ -148,7 +148,7 @@ def _lower_one(height, state, labels, box, step, sizes, inside, rise, reached, s
             known[side] += 1
     if n < 8:
         return False
-    base = np.int64(np.median(border[:n]))
+    base = np.int64(np.sort(border[:n])[n // 2])
     level, taken = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
     lower, higher, all_known, smooth = 0, 0, 0, 0
     for i in range(len(cells)):

@@ -304,14 +304,23 @@ def _sink(height, labels, chosen, above):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _beside(height, labels, chosen, waiting, r, c, above):  # type: ignore[no-untyped-def]
-    """Mean height of the roof among a cell's eight neighbours, -1 when there is none."""
+    """Mean height of the roof among a cell's eight neighbours, of the level that most of them share; -1 without one."""
     rows, columns = height.shape
-    total, many = 0, 0
-    own = height[r, c]
+    levels = np.empty(8, dtype=np.int64)
+    n = 0
     for i in range(max(r - 1, 0), min(r + 2, rows)):
         for j in range(max(c - 1, 0), min(c + 2, columns)):
-            if labels[i, j] > 0 and not waiting[i, j] and not chosen[i, j] and height[i, j] >= 0:
-                if height[i, j] <= own + above:
-                    total += height[i, j]
-                    many += 1
-    return total // many if many > 0 else -1
+            roof = labels[i, j] > 0 and not waiting[i, j] and not chosen[i, j]
+            if roof and 0 <= height[i, j] <= height[r, c] + above:
+                levels[n] = height[i, j]
+                n += 1
+    best, most = -1, 0
+    for k in range(n):
+        total, many = 0, 0
+        for other in range(n):
+            if abs(levels[other] - levels[k]) <= _LEDGE:
+                total += levels[other]
+                many += 1
+        if many > most or (many == most and total < best * many):
+            best, most = total // many, many
+    return best
