@@ -70,15 +70,15 @@ def lower_storeys(height, state, labels, count, boxes, step):  # type: ignore[no
     box = np.empty(5)
     for k in range(len(boxes)):
         box[:] = boxes[k]
-        _grow(state, box)
+        _grow(height, state, box, step)
         if _lower_one(height, state, labels, box, step, sizes, inside, rise, reached, storey):
             found = True
     return found
 
 
 @njit(cache=True, nogil=True)
-def _grow(state, box):  # type: ignore[no-untyped-def]
-    """Move the sides of a box out over strips of half a cell that are mostly high, in place.
+def _grow(height, state, box, step):  # type: ignore[no-untyped-def]
+    """Move the sides of a box out over strips of half a cell that are mostly high, in place, but not up a step.
 
     A box of cells that are all high stops short of the ragged edge of a roof that is turned against the grid.
     """
@@ -91,12 +91,16 @@ def _grow(state, box):  # type: ignore[no-untyped-def]
             many = max(int(along), 1)
             high, unknown = 0, 0
             out = end * (0.5 * box[2 + axis] + 0.25)
-            for i in range(many):
-                at = ((i + 0.5) / many - 0.5) * along
+            for k in range(many):
+                at = ((k + 0.5) / many - 0.5) * along
                 u, v = (out, at) if axis == 0 else (at, out)
                 c, r = math.floor(box[0] + u * cos - v * sin), math.floor(box[1] + u * sin + v * cos)
                 if 0 <= r < rows and 0 <= c < columns:
-                    high += state[r, c] == HIGH
+                    u, v = (out - end * _BORDER, at) if axis == 0 else (at, out - end * _BORDER)
+                    j, i = math.floor(box[0] + u * cos - v * sin), math.floor(box[1] + u * sin + v * cos)
+                    inner = 0 <= i < rows and 0 <= j < columns and state[i, j] == HIGH
+                    level = not inner or height[r, c] <= height[i, j] + step
+                    high += state[r, c] == HIGH and level
                     unknown += state[r, c] == VOID
             if high < _LEVEL * (many - unknown) or 3 * high < many:
                 break
