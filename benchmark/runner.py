@@ -149,7 +149,7 @@ def _outcomes(
         elsewhere = execution.jobs > 0 or execution.scheduler is not None
         scenes = _Scenes(stack, elsewhere=elsewhere)
         dispatcher, flying = Dispatcher(runs), dict[Future[bytes], tuple[PlannedRun, Slot]]()
-        free = [slot for slot in slots for _ in range(slot.capacity)]
+        free = [slot for turn in range(max(slot.capacity for slot in slots)) for slot in slots if turn < slot.capacity]
         while True:
             while free and (run := dispatcher.next_for(free[0])) is not None:
                 if overwrite != "always" and _is_stored(store, run):

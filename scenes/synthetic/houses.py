@@ -8,6 +8,8 @@ L, T
     A body across the parcel and a wing, at one end or in the middle.
 U, C
     A body and two wings; for a C one wing returns towards the other around a court.
+row of garages
+    Instead of a house, as behind blocks of flats.
 """
 
 from __future__ import annotations
@@ -49,7 +51,9 @@ class _Plan:
 
 
 def compose_house(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> list[list[Solid]]:
-    """Return the parts of a house, then those of each outbuilding behind it."""
+    """Return the parts of a house, then those of each outbuilding behind it; or one row of garages."""
+    if parcel.even[1] >= 1 - recipe.garage_rows:
+        return [[_garage_row(parcel, recipe, draws)]]
     size = recipe.building_size
     left, right = (max(0.3, recipe.gap / 2 * draws.between(0.6, 1.4)) for _ in range(2))
     drive = draws.chance(0.55) * draws.between(1.6, 2.8)
@@ -136,6 +140,16 @@ def _outbuildings(parcel: Parcel, recipe: SceneParameters, draws: Draws, rear: f
             roof=roof,
             pitch=0.0 if roof == Roof.FLAT else rise * (0.3 if roof == Roof.SHED else 1.0),
         )
+
+
+def _garage_row(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> Solid:
+    """Return a row of garages under one flat roof, which takes the whole frontage."""
+    deep = draws.between(5.6, 6.4)
+    front = -parcel.depth / 2 + recipe.setback
+    turn = math.radians(recipe.orientation_spread) * draws.normal()
+    return parcel.place(
+        0.0, front + deep / 2, parcel.width - 1.0, deep, turn=turn, eave=draws.between(2.6, 2.9), roof=Roof.FLAT
+    )
 
 
 def _deepest(parcel: Parcel, part: Solid) -> float:

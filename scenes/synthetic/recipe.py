@@ -78,6 +78,9 @@ class SceneParameters(Parameterised):
         0.34, minimum=0, maximum=1, doc="share of the houses that are one rectangle; others are L, T, U or C"
     )
     outbuildings: float = parameter(0.5, minimum=0, maximum=2, doc="garages and sheds of 10 m2 and more per house")
+    garage_rows: float = parameter(
+        0.0, minimum=0, maximum=1, doc="share of the parcels with a row of garages instead of a house"
+    )
     building_size: float = parameter(
         1.0, minimum=0.4, maximum=1.6, doc="factor on the sides of buildings", swept=(0.6, 0.8, 1.0, 1.2)
     )

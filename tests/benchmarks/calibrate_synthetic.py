@@ -85,7 +85,7 @@ def read(files, outline_file, name):
 
 def synthetic(name, preset, **parameters):
     # The density and the precision of today's scanners, which the real scenes were measured with.
-    scanner = {"point_spacing": 0.32, "vertical_noise": 0.015, "horizontal_noise": 0.04}
+    scanner = {"point_spacing": 0.32, "vertical_noise": 0.015, "horizontal_noise": 0.04, "digitised": "ground"}
     scene = rb.make_scene(preset, seed=3, pulse="all", width=150, height=150, gsd=0.25, **scanner, **parameters)
     cloud, image = scene.points, scene.image
     cells, _ = image.grid.cells(cloud.x, cloud.y)

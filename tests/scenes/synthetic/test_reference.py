@@ -75,6 +75,17 @@ def test_houses_have_one_to_four_rectangles():
     assert set(np.unique(np.concatenate(aligned))) == {1, 2, 3, 4}
 
 
+def test_rows_of_garages_are_long_low_and_flat():
+    plain, rows = (rb.make_scene("vaihingen-a-small", seed=1, garage_rows=share).reference for share in (0.0, 1.0))
+    assert plain.attributes["height"].max() > 4
+    assert rows.attributes["height"].max() < 3
+    index, corners = rows.quadrilaterals
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1)
+    assert len(index) == len(rows) == preset("vaihingen-a-small").buildings
+    assert (sides.max(axis=1) > 12).all()
+    assert (sides.min(axis=1) < 7).all()
+
+
 @pytest.mark.parametrize("buildings", range(5, 12))
 def test_a_number_of_rectangles_is_exact_whatever_shape_comes_last(buildings):
     """The last building has fewer wings where need be, and is still in one piece."""
