@@ -24,7 +24,7 @@ from .boxes import OX, OY, UX, UY, Boxes, box_corners, lengths, prefix_sums, wid
 from .colours import Colours
 from .contours import trace_shapes
 from .corners import find_corners
-from .extension import Cover, Growth, extend_lines
+from .extension import Cover, Growth, extend_lines, last_step
 from .final import FinalRules, final_rectangles
 from .masks import Masks, build_masks, ground_heights, point_spacing
 from .rectangles import INSIDE, initial_rectangles
@@ -173,11 +173,11 @@ class LineDetector(Detector):
     )
     inside_margin: float | None = parameter(
         None, unit="m", minimum=0,
-        doc="how far outside a rectangle a line counts as in it; none: point spacing + a pixel; not in the print",
+        doc="how far outside a rectangle a line counts as in it; none: last step of its extension + a pixel; printed 0",
         source="2010, 3.3.3; reading",
     )  # fmt: skip
     inside_share: float = parameter(
-        0.75, minimum=0, maximum=1, doc="share of its length by which a line whose midpoint is in a rectangle is in it",
+        0.9, minimum=0, maximum=1, doc="share of its length by which a line whose midpoint is in a rectangle is in it",
         source="2010, 3.3.3; reading",
     )  # fmt: skip
     reduction: float = parameter(
@@ -310,14 +310,15 @@ class LineDetector(Detector):
         """
         gsd = rasters.gsd
         alive = np.flatnonzero(fates == Fate.RECTANGLE)
+        growth = self._growth(rasters)
         initial, made = initial_rectangles(
             rasters.cover,
-            self._growth(rasters),
+            growth,
             lines[alive],
             by_length(lines[alive]),
             self.initial_width / gsd,
             self.minimum_side / gsd,
-            rasters.spacing / gsd + 1.0 if self.inside_margin is None else self.inside_margin / gsd,
+            last_step(growth) + 1.0 if self.inside_margin is None else self.inside_margin / gsd,
             self.inside_share,
         )
         fates[alive[made < 0]] = np.where(made[made < 0] == INSIDE, Fate.INSIDE, Fate.NARROW)

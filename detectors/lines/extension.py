@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .boxes import U0, U1, V0, V1, Boxes, sum_in_box
 
-__all__ = ["Cover", "Growth", "band", "extend_lines", "extend_rectangle", "mean_in_boxes"]
+__all__ = ["Cover", "Growth", "band", "extend_lines", "extend_rectangle", "last_step", "mean_in_boxes"]
 
 
 class Cover(NamedTuple):
@@ -62,6 +62,14 @@ class Growth(NamedTuple):
     part: float
     vegetation: float
     entropy: float
+
+
+def last_step(rules: Growth) -> float:
+    """Return the smallest step that a side tries, pixels: it ends at most so far short of the black's end."""
+    step = rules.step
+    while step / 2 >= rules.least_step:
+        step /= 2
+    return step
 
 
 @njit(cache=True)

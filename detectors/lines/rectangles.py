@@ -1,7 +1,8 @@
 """Initial rectangles: where buildings are, grown from the longest lines first.
 
-A line is *already inside* a rectangle when its midpoint and at least half of its length are; it makes no rectangle of
-its own. Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.3.
+A line is *already inside* a rectangle when its midpoint and at least nine tenths of its length are, within what the
+rectangle's extension may have ended short; it makes no rectangle of its own.
+Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.3.
 """
 
 from __future__ import annotations
