@@ -84,6 +84,15 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
     if len(cloud) == 0:
         raise InputError(f"{names} has no points in {text(place.extent)}: choose another --extent")
     _check_bounds(place, cloud, names)
+    wild = (cloud.z < _LOWEST_LAND) | (cloud.z > _HIGHEST_LAND)
+    if wild.any():
+        value = float(cloud.z[wild][0])
+        cloud = cloud.take(~wild)
+        place.log.note(
+            f"{np.count_nonzero(wild)} points at heights such as {value:g} m, where no land is, were left out"
+        )
+        if len(cloud) == 0:
+            raise InputError(f"{names} holds no heights of land: the first is {value:g} m; are they scaled?")
     if cloud.classification is not None:
         noise = np.isin(cloud.classification, _NOISE)
         if noise.any():

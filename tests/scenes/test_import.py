@@ -315,6 +315,20 @@ def test_noise_and_withheld_points_are_left_out(files, bring):
     assert points.z.min() > 99
 
 
+def test_points_where_no_land_is_are_left_out(files, bring, refused):
+    cloud = small_scenes.scene().points
+    heights = cloud.z.copy()
+    heights[:7] = -9999
+    write_points(rb.PointCloud(cloud.x, cloud.y, heights), files / "wild.laz", crs=CRS)
+    code, _, told = bring("wild.laz")
+    assert code == 0, told
+    assert "7 points at heights such as -9999 m, where no land is, were left out" in told
+    assert rb.open_scene(files / "out").points.z.min() > 0
+    write_points(rb.PointCloud(cloud.x, cloud.y, np.full_like(heights, 5e4)), files / "space.laz", crs=CRS)
+    (files / "out").rename(files / "kept")
+    assert "space.laz holds no heights of land" in refused("space.laz")
+
+
 def test_points_without_crs_take_the_one_named_and_say_so(files, bring):
     write_points(small_scenes.cloud(), files / "bare.laz")
     code, _, err = bring("bare.laz", "--crs", CRS)
