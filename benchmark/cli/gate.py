@@ -156,10 +156,10 @@ def gate(
         raise typer.Exit(4)
     extra = time_side_by_side(before, after, margin=time_margin, level=level) if time else []
     result = compare(before, after, indices=indices, margins=margins, level=level, extra=extra)
-    typer.echo(format_gate(result, form))
     if output is not None:
         with whole_file(output, overwrite=True) as scratch:
             scratch.write_text(format_gate(result, "md") + "\n", encoding="utf-8")
+    typer.echo(format_gate(result, form))
     raise typer.Exit(result.exit_code)
 
 

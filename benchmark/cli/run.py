@@ -96,17 +96,18 @@ def run(
         told.print(
             f"{result.done} runs done, {known} stored before, {len(result.failed)} failed; store {options.store}"
         )
-        for number, board in enumerate(boards):
-            if number:
-                typer.echo()
-            board.print(table_console())
-        print_incidents(incidents_of(result.rows), told)
+        # Files before the table: who reads it may close the pipe (head).
         if output is not None:
             _write(output, boards)
             if any(entry.scenes for board in boards for entry in board.entries):
                 judged = list(zip(plan.judges, boards, strict=True))
                 filled = fill_report(opened, result.rows, title=f"Suite {suite.name}", judged=judged)
                 write_report(filled, output / "report.html", overwrite=True)
+        for number, board in enumerate(boards):
+            if number:
+                typer.echo()
+            board.print(table_console())
+        print_incidents(incidents_of(result.rows), told)
         if result.failed:
             raise typer.Exit(3)
         if not any(entry.scenes for board in boards for entry in board.entries):

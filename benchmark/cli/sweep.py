@@ -76,6 +76,10 @@ def sweep(
         planned = make_sweep(suite, [axis_of(text) for text in vary or ()], opened, grid=grid)
         with run_progress(planned.plan, told) as report:
             table, rows = run_sweep(planned, opened, execution=execution, progress=report)
+    # The file before the table: who reads that may close the pipe (head).
+    if output is not None:
+        write_table(table, output, overwrite=overwrite)
+        told.print(f"{output}: {len(table)} rows", markup=False)
     _print(table, planned, shown)
     if level is not None:
         first = table[table["evaluator"] == planned.plan.judges[0].label]
@@ -83,9 +87,6 @@ def sweep(
             typer.echo(str(found))
     incidents = incidents_of(rows)
     print_incidents(incidents, told)
-    if output is not None:
-        write_table(table, output, overwrite=overwrite)
-        told.print(f"{output}: {len(table)} rows", markup=False)
     if any(incident.status == "failed" for incident in incidents):
         raise typer.Exit(3)
     if not table["scenes"].any():

@@ -258,3 +258,23 @@ def test_the_folder_for_results_is_checked_before_the_runs(cli, misbehaving, tmp
     told = cli("run", "hamlet", "-d", misbehaving, "-j", 0, "-o", "out", code=2)
     assert "out cannot be made: it is a file" in told
     assert "0 of 0 runs" in cli("ls").stdout
+
+
+def test_files_are_written_before_a_table_that_nobody_reads(cli, misbehaving, tmp_path, monkeypatch):
+    from roofbench.benchmark.cli import sweep
+    from roofbench.reports.tables import Leaderboard
+
+    def closed(*_):
+        raise BrokenPipeError
+
+    monkeypatch.setattr(Leaderboard, "print", closed)
+    monkeypatch.setattr(sweep, "_print", closed)
+    for words in (
+        ("run", "hamlet", "-d", misbehaving, "-j", 0, "-o", "out"),
+        ("sweep", misbehaving, "hamlet", "--vary", "side=7,9", "-j", 0, "-o", "sweep.csv"),
+    ):
+        with pytest.raises(BrokenPipeError):
+            cli(*words)
+    assert (tmp_path / "out" / "leaderboard.csv").exists()
+    assert (tmp_path / "out" / "report.html").exists()
+    assert (tmp_path / "sweep.csv").exists()
