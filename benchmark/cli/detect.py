@@ -36,7 +36,10 @@ def detect(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what exists.")] = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Detect buildings on one scene and write their footprints."""
+    """Detect buildings on one scene and write their footprints.
+
+    Exit code 3 when the detector fails; the end of its traceback is shown.
+    """
     import time
 
     from ...detectors.registry import make_detector

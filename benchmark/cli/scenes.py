@@ -82,7 +82,9 @@ def import_(
     source: Annotated[str | None, typer.Option(help="Where the data come from, for the manifest.")] = None,
     licence: Annotated[str | None, typer.Option(help="Licence of the data, for the manifest.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the folder if it exists.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Do not tell what was assigned, mended or derived.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Do not tell what was assigned, mended or derived.")
+    ] = False,
 ) -> None:
     """Make a scene folder from point files, orthoimages, footprints.
 

@@ -337,6 +337,13 @@ def test_points_without_crs_take_the_one_named_and_say_so(files, bring):
     assert rb.open_scene(files / "out").crs == CRS
 
 
+def test_notes_are_kept_but_not_told_when_quiet(files, bring):
+    code, out, told = bring("points.laz", "-q")
+    assert (code, told) == (0, "")
+    assert "scene 'out'" in out
+    assert rb.open_scene(files / "out").facts["notes"]
+
+
 def test_a_crs_may_be_a_number(files, bring):
     las(files / "bare.laz")
     code, _, told = bring("bare.laz", "--crs", CRS.removeprefix("EPSG:"))
