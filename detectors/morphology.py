@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["opened", "without_holes"]
+__all__ = ["closed", "opened", "without_holes"]
 
 _Mask = NDArray[np.bool_]
 
@@ -19,6 +19,16 @@ def without_holes(mask: _Mask, largest: float) -> _Mask:
     small = statistics[:, cv2.CC_STAT_AREA] <= largest
     small[0] = False
     return np.asarray((solid > 0) | small[labels])
+
+
+def closed(mask: _Mask, radius: float) -> _Mask:
+    """Return the mask with what a disc of a radius does not fit into beside it filled."""
+    import cv2
+
+    reach = int(radius) + 2
+    solid = np.pad(mask.astype(np.uint8), reach)
+    filled = cv2.morphologyEx(solid, cv2.MORPH_CLOSE, _disc(radius))
+    return np.asarray(filled[reach:-reach, reach:-reach] > 0)
 
 
 def opened(mask: _Mask, radius: float) -> _Mask:

@@ -5,7 +5,8 @@ Nouns
 evidence
     Score (`background`) of the high cells around a high cell, summed up with the weights of a Gaussian.
 built
-    High cells with evidence for a roof, wherever they are, and all but low cells inside rectangles.
+    High cells with evidence for a roof, wherever they are, all but low cells inside rectangles, and high cells in gaps
+    between those that are narrower than `_NARROW`: rough corners, passages and yards that are roofed over.
 block
     Connected part of what is built, after small holes are filled and narrow parts between rectangles cut off, that lies
     at least half inside rectangles. Its outline gets straight walls (`regularise`).
@@ -20,7 +21,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ...scenes.raster import Grid
-from ..morphology import opened, without_holes
+from ..morphology import closed, opened, without_holes
 from ..outlines import coverage_of_mask, trace
 from ..regularise import regularise
 from .cells import HIGH, LOW
@@ -30,6 +31,8 @@ __all__ = ["outline_blocks"]
 
 #: Metres: sigma of the mean of evidence, radius of the opening, least distance of points that are no wall.
 _SIGMA, _OPENING, _STRAIGHT = 0.75, 1.0, 0.5
+#: Metres: width of the gaps in which every high cell is built. A crown needs more room.
+_NARROW = 5.0
 #: Square metres: largest hole that is filled, smallest block.
 _HOLE, _SMALLEST = 10.0, 5.0
 #: Share of a block that must lie inside rectangles.
@@ -59,7 +62,9 @@ def outline_blocks(
     around = cv2.GaussianBlur(np.where(high, score, 0).astype(np.float32), (0, 0), _SIGMA / gsd)
     roof = high & (around > 0)
     sure = inside & (state != LOW)
-    built = opened(without_holes(roof | sure, _HOLE / gsd**2), _OPENING / gsd) | sure
+    built = roof | sure
+    built |= high & closed(built, 0.5 * _NARROW / gsd)
+    built = opened(without_holes(built, _HOLE / gsd**2), _OPENING / gsd) | sure
     _, labels = cv2.connectedComponents(built.astype(np.uint8), connectivity=4)
     sizes = np.bincount(labels.ravel())
     kept = np.bincount(labels.ravel(), weights=inside.ravel()) >= _CONFIRMED * sizes

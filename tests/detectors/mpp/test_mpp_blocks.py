@@ -46,6 +46,12 @@ def test_what_no_rectangle_confirms_is_no_block_and_a_crown_beside_a_house_none_
     assert likeness(found[0], shapely.box(5, 5, 15, 15)) > 0.93
 
 
+def test_what_is_high_in_a_narrow_gap_joins_two_roofs_and_a_lane_parts_them():
+    houses = [(5, 5, 15, 20), (18, 5, 28, 20)]
+    assert len(outlined(houses, houses, crowns=[(15, 5, 18, 20)])) == 1
+    assert len(outlined(houses, houses)) == 2
+
+
 def test_a_courtyard_is_a_hole():
     wings = [(5, 5, 30, 11), (5, 21, 30, 27), (5, 11, 11, 21), (24, 11, 30, 21)]
     found = outlined(wings, wings)
