@@ -19,23 +19,25 @@ from ...scenes.parameters import parameter
 from ...scenes.raster import Image
 from ...scenes.scene import Scene
 from ..base import Detector, Step
-from .adjustment import by_length
-from .boxes import OX, OY, UX, UY, Boxes, box_corners, lengths, prefix_sums, widths
+from .adjustment import by_length, rotate
+from .boxes import Boxes, box_corners, lengths, prefix_sums, widths
 from .colours import Colours
 from .contours import trace_shapes
 from .corners import find_corners
 from .extension import Cover, Growth, extend_lines, last_step
 from .final import FinalRules, final_rectangles
-from .masks import Masks, build_masks, ground_heights, point_spacing
+from .masks import build_masks, ground_heights, point_spacing
+from .rasters import Rasters
 from .rectangles import INSIDE, initial_rectangles
-from .segments import Segments, fit_segments, inside_first
-from .trace import Fate
+from .segments import Segments, beyond_coverage, fit_segments, inside_first
+from .trace import Fate, Trace
 from .vegetation import vegetation_prefix
 
 if TYPE_CHECKING:
-    from .trace import Trace
+    from .image_edges import ImageEdges
+    from .texture import Texture
 
-__all__ = ["PAPER_PIXEL", "LineDetector", "Rasters"]
+__all__ = ["PAPER_PIXEL", "LineDetector"]
 
 #: Ground sampling distance that the 2010 paper's pixel counts refer to, metres.
 PAPER_PIXEL = 0.15
@@ -49,32 +51,6 @@ _EXTENSION_PART = 6.0
 _MISSED_CORNER = 0.5
 #: Threshold that no mean reaches: entropy is not used.
 _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
-
-
-@dataclass(frozen=True, eq=False)
-class Rasters:
-    """What the steps read of a scene.
-
-    Attributes
-    ----------
-    image : Image
-    masks : Masks
-    cover : Cover
-    colours : Colours
-    spacing : float
-        Point spacing, metres.
-    """
-
-    image: Image
-    masks: Masks
-    cover: Cover
-    colours: Colours
-    spacing: float
-
-    @property
-    def gsd(self) -> float:
-        """Ground sampling distance, metres."""
-        return self.image.grid.gsd
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,6 +126,10 @@ class LineDetector(Detector):
         22.5, unit="deg", minimum=0, maximum=45, doc="largest rotation of a line to be parallel or perpendicular",
         source="2010, 3.3.2",
     )  # fmt: skip
+    adjustment_radius: float = parameter(
+        50.0, unit="m", minimum=0, doc="largest distance of a line and its reference when turned to neighbours",
+        source="2010, 3.3.2",
+    )  # fmt: skip
     extension: float = parameter(
         3.0, unit="m", minimum=0.1, doc="depth and first step of the extension of lines and initial rectangles",
         source="2010, 3.3.2",
@@ -218,9 +198,69 @@ class LineDetector(Detector):
         source="2010, 3.4; reading",
     )  # fmt: skip
 
-    @abstractmethod
     def run(self, rasters: Rasters) -> Trace:
         """Run all steps that follow the masks, keeping the intermediate results."""
+        segments, fates = self._fitted_lines(rasters)
+        leafy, rescued = self._tree_edges(rasters, segments.lines)
+        rescued &= fates == Fate.RECTANGLE
+        fates[(fates == Fate.RECTANGLE) & leafy] = Fate.VEGETATION
+
+        rotation = np.full(len(segments), np.nan)
+        alive = np.flatnonzero(fates == Fate.RECTANGLE)
+        rotation[alive] = self._rotation(segments.take(alive), rasters.gsd)
+        fates[alive[np.isnan(rotation[alive])]] = Fate.UNADJUSTED
+        alive = np.flatnonzero(fates == Fate.RECTANGLE)
+        lines = segments.lines.copy()
+        lines[alive] = self._extended(rasters, rotate(lines[alive], rotation[alive]))
+
+        edges = self._image_edges(rasters)
+        votes = self._votes(lines, rotation, edges, segments.shapes, fates, rasters.gsd)
+        initial, initial_fates, candidates = self._rectangles(rasters, lines, fates)
+        texture = self._judged(candidates, edges, rasters)
+        return Trace(
+            image=rasters.image,
+            masks=rasters.masks,
+            vegetation=rasters.cover.vegetation,
+            fitted=segments.lines,
+            lines=lines,
+            shapes=segments.shapes,
+            fates=fates,
+            rescued=rescued,
+            initial=initial,
+            initial_fates=initial_fates,
+            candidates=candidates,
+            kept=np.ones(len(candidates), dtype=np.bool_) if texture is None else np.any(texture.passed, axis=1),
+            votes=votes,
+            texture=texture,
+        )
+
+    @abstractmethod
+    def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which lines are tree edges, and which are green but not."""
+
+    @abstractmethod
+    def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
+        """Return the angle that adjusts each line, radians, NaN for lines that are dropped."""
+
+    def _image_edges(self, rasters: Rasters) -> ImageEdges | None:
+        """Return the edges of the image; none where nothing asks for them."""
+        return None
+
+    def _votes(
+        self,
+        lines: Boxes,
+        rotation: NDArray[np.float64],
+        edges: ImageEdges | None,
+        shapes: NDArray[np.int64],
+        fates: NDArray[np.int64],
+        gsd: float,
+    ) -> NDArray[np.float64] | None:
+        """Return the votes of each line, none without voting; write the fates of those outvoted into `fates`."""
+        return None
+
+    def _judged(self, candidates: Boxes, edges: ImageEdges | None, rasters: Rasters) -> Texture | None:
+        """Return the texture of the candidates, none where they are not judged by it."""
+        return None
 
     def trace(self, scene: Scene) -> Trace:
         """Detect, and return every intermediate result."""
@@ -298,7 +338,7 @@ class LineDetector(Detector):
         reach = max(1.0, self.inside_reach * PAPER_PIXEL / gsd)
         lines = inside_first(segments.lines, black, reach=reach, outset=_OUTSET)
         fates = np.full(len(lines), Fate.RECTANGLE, dtype=np.int64)
-        fates[_beyond(lines, rasters.masks.coverage, reach)] = Fate.BORDER
+        fates[beyond_coverage(lines, rasters.masks.coverage, reach)] = Fate.BORDER
         return Segments(lines, segments.shapes), fates
 
     def _rectangles(
@@ -348,13 +388,3 @@ class LineDetector(Detector):
     def _extended(self, rasters: Rasters, lines: Boxes) -> Boxes:
         extended: Boxes = extend_lines(rasters.cover, self._growth(rasters), lines, self.extension / rasters.gsd)
         return extended
-
-
-def _beyond(lines: Boxes, coverage: NDArray[np.uint8], reach: float) -> NDArray[np.bool_]:
-    """Tell which lines have nothing measured on their outer side: the border of the points or of the image."""
-    rows, columns = coverage.shape
-    x = np.floor(lines[:, OX] + reach * lines[:, UY]).astype(np.intp)
-    y = np.floor(lines[:, OY] - reach * lines[:, UX]).astype(np.intp)
-    on = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
-    covered = coverage[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)] > 0
-    return np.asarray(~(on & covered), dtype=np.bool_)

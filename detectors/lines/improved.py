@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 
 from ...scenes.parameters import parameter
 from ...scenes.raster import Image
-from .adjustment import adjust_to_neighbours, adjust_to_shape, rotate
+from .adjustment import adjust_to_neighbours, adjust_to_shape
 from .boxes import Boxes, lengths, prefix_sums
-from .detector import LineDetector, Rasters
+from .detector import LineDetector
 from .entropy import grey_levels, local_entropy
 from .extension import band, mean_in_boxes
 from .image_edges import ImageEdges, extract_edges
+from .rasters import Rasters
 from .segments import Segments
-from .texture import judge
-from .trace import Fate, Trace
+from .texture import Texture, judge
+from .trace import Fate
 from .voting import cast_votes, longest_image_lines
 
 __all__ = ["Improved"]
@@ -54,10 +55,6 @@ class Improved(LineDetector):
         doc="what lines are turned to: the longest line of their black shape, beyond its reach the next longest; the "
         "longest alone, as printed; any line within 50 m; nothing",
         source="2011, 3.3; reading",
-    )  # fmt: skip
-    adjustment_radius: float = parameter(
-        50.0, unit="m", minimum=0, doc="largest distance of a line and its reference when turned to neighbours",
-        source="2010, 3.3.2",
     )  # fmt: skip
     voting: bool = parameter(True, doc="whether lines are voted on; optional in the print", source="2011, 3.3")
     vote_length: str = parameter(
@@ -93,60 +90,6 @@ class Improved(LineDetector):
         4.5, unit="m", minimum=0, doc="least area per length of edges (test 6); 45 px of 0.1 m", source="2011, 3.4"
     )
 
-    def run(self, rasters: Rasters) -> Trace:
-        """Run all steps that follow the masks, keeping the intermediate results."""
-        gsd = rasters.gsd
-        segments, fates = self._fitted_lines(rasters)
-        green, leafy = self._tree_edges(rasters, segments.lines)
-        alive = fates == Fate.RECTANGLE
-        fates[alive & leafy] = Fate.VEGETATION
-        rescued = alive & green & ~leafy
-
-        rotation = self._rotation(segments, fates == Fate.RECTANGLE, gsd)
-        fates[(fates == Fate.RECTANGLE) & np.isnan(rotation)] = Fate.UNADJUSTED
-        lines = segments.lines.copy()
-        alive = fates == Fate.RECTANGLE
-        lines[alive] = self._extended(rasters, rotate(lines[alive], rotation[alive]))
-
-        edges = self._image_edges(rasters) if self.voting or self.texture else None
-        votes = judged = None
-        if self.voting:
-            assert edges is not None
-            votes = self._votes(lines, rotation, edges, segments.shapes, alive, gsd)
-            fates[alive & ~(np.nan_to_num(votes).mean(axis=1) > self.majority)] = Fate.OUTVOTED
-
-        initial, initial_fates, final = self._rectangles(rasters, lines, fates)
-        kept = np.ones(len(final), dtype=np.bool_)
-        if self.texture:
-            assert edges is not None
-            judged = judge(
-                final,
-                edges,
-                rasters.image.grid.shape,
-                gsd,
-                margin=self.texture_margin,
-                least=self.minimum_side,
-                most_edges=self.most_edges,
-                area_per_edge=self.area_per_edge,
-            )
-            kept = np.any(judged.passed, axis=1)
-        return Trace(
-            image=rasters.image,
-            masks=rasters.masks,
-            vegetation=rasters.cover.vegetation,
-            fitted=segments.lines,
-            lines=lines,
-            shapes=segments.shapes,
-            fates=fates,
-            rescued=rescued,
-            initial=initial,
-            initial_fates=initial_fates,
-            candidates=final,
-            kept=kept,
-            votes=votes,
-            texture=judged,
-        )
-
     def _entropy(self, image: Image) -> NDArray[np.int32]:
         prefix: NDArray[np.int32] = prefix_sums(local_entropy(grey_levels(image)))
         return prefix
@@ -155,7 +98,6 @@ class Improved(LineDetector):
         return 255.0 * self.entropy_threshold
 
     def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return which lines the vegetation index calls tree edges, and which of them the entropy does too."""
         width = self.band_width / rasters.gsd
         sides = [band(lines, width, 0.0)]
         if self.vegetation_side == "either":
@@ -165,27 +107,23 @@ class Improved(LineDetector):
             is_green = mean_in_boxes(rasters.cover.vegetation, side) > self.vegetation_threshold
             green |= is_green
             leafy |= is_green & (mean_in_boxes(rasters.cover.entropy, side) > self._entropy_limit())
-        return green, leafy
+        return leafy, green & ~leafy
 
-    def _rotation(self, segments: Segments, alive: NDArray[np.bool_], gsd: float) -> NDArray[np.float64]:
-        rotation = np.full(len(segments), np.nan)
+    def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
         tolerance = np.radians(self.adjustment_angle)
         if self.adjustment in ("bases", "longest"):
-            rotation[alive] = adjust_to_shape(
-                segments.lines[alive],
-                segments.shapes[alive],
-                tolerance=tolerance,
-                longest_only=self.adjustment == "longest",
+            return adjust_to_shape(
+                segments.lines, segments.shapes, tolerance=tolerance, longest_only=self.adjustment == "longest"
             )
-        elif self.adjustment == "neighbours":
-            rotation[alive] = adjust_to_neighbours(
-                segments.lines[alive], radius=self.adjustment_radius / gsd, tolerance=tolerance, longer_only=False
+        if self.adjustment == "neighbours":
+            return adjust_to_neighbours(
+                segments.lines, radius=self.adjustment_radius / gsd, tolerance=tolerance, longer_only=False
             )
-        else:
-            rotation[alive] = 0.0
-        return rotation
+        return np.zeros(len(segments))
 
-    def _image_edges(self, rasters: Rasters) -> ImageEdges:
+    def _image_edges(self, rasters: Rasters) -> ImageEdges | None:
+        if not (self.voting or self.texture):
+            return None
         return extract_edges(
             grey_levels(rasters.image),
             gsd=rasters.gsd,
@@ -201,13 +139,17 @@ class Improved(LineDetector):
         self,
         lines: Boxes,
         rotation: NDArray[np.float64],
-        edges: ImageEdges,
+        edges: ImageEdges | None,
         shapes: NDArray[np.int64],
-        alive: NDArray[np.bool_],
+        fates: NDArray[np.int64],
         gsd: float,
-    ) -> NDArray[np.float64]:
+    ) -> NDArray[np.float64] | None:
+        if not self.voting:
+            return None
+        assert edges is not None
+        alive = fates == Fate.RECTANGLE
         image_lengths = longest_image_lines(lines, edges.lines, half_width=self.band_width / 2 / gsd)
-        return cast_votes(
+        votes = cast_votes(
             lengths(lines) * gsd,
             rotation,
             image_lengths * gsd,
@@ -216,4 +158,21 @@ class Improved(LineDetector):
             tolerance=np.radians(self.adjustment_angle),
             least=self.minimum_side,
             length_as_printed=self.vote_length == "printed",
+        )
+        fates[alive & ~(np.nan_to_num(votes).mean(axis=1) > self.majority)] = Fate.OUTVOTED
+        return votes
+
+    def _judged(self, candidates: Boxes, edges: ImageEdges | None, rasters: Rasters) -> Texture | None:
+        if not self.texture:
+            return None
+        assert edges is not None
+        return judge(
+            candidates,
+            edges,
+            rasters.image.grid.shape,
+            rasters.gsd,
+            margin=self.texture_margin,
+            least=self.minimum_side,
+            most_edges=self.most_edges,
+            area_per_edge=self.area_per_edge,
         )

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, Boxes, lengths
 from .contours import Curves
 
-__all__ = ["Segments", "fit_line", "fit_segments", "inside_first"]
+__all__ = ["Segments", "beyond_coverage", "fit_line", "fit_segments", "inside_first"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,3 +221,13 @@ def inside_first(lines: Boxes, black: NDArray[np.uint8], *, reach: float, outset
     turned[:, U0], turned[:, U1] = -half, half
     turned[:, V0] = turned[:, V1] = 0.0
     return turned
+
+
+def beyond_coverage(lines: Boxes, coverage: NDArray[np.uint8], reach: float) -> NDArray[np.bool_]:
+    """Tell which lines have nothing measured on their outer side: the border of the points or of the image."""
+    rows, columns = coverage.shape
+    x = np.floor(lines[:, OX] + reach * lines[:, UY]).astype(np.intp)
+    y = np.floor(lines[:, OY] - reach * lines[:, UX]).astype(np.intp)
+    on = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+    covered = coverage[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)] > 0
+    return np.asarray(~(on & covered), dtype=np.bool_)
