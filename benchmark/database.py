@@ -5,6 +5,7 @@ Apart from the store, because a listing of runs needs nothing else and must not 
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ _BUSY_SECONDS = 60
 
 
 def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
-    """Open a store, made when missing and brought to the current schema.
+    """Open a store, made when missing and brought to the current schema; one in a read-only folder to be read.
 
     Raises
     ------
@@ -31,11 +32,16 @@ def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
         raise InputError(f"{path}: no such results store; 'roofbench run' makes one, or name it with --store")
     if not path.parent.is_dir():
         raise OutputError(f"{path} cannot be written: there is no folder {path.parent}")
+    # In a folder that cannot be written SQLite finds no place for its side files: the store is opened to be read.
+    sealed = path.is_file() and not os.access(path.parent, os.W_OK)
+    name = f"{path.resolve().as_uri()}?immutable=1" if sealed else path
     try:
-        db = sqlite3.connect(path, timeout=_BUSY_SECONDS, isolation_level=None)
+        db = sqlite3.connect(name, timeout=_BUSY_SECONDS, isolation_level=None, uri=sealed)
         db.execute(f"PRAGMA busy_timeout = {_BUSY_SECONDS * 1000}")
         db.row_factory = sqlite3.Row
         prepare(db, path)
+        if sealed:
+            return db
         db.execute("PRAGMA journal_mode = WAL")
         db.execute("PRAGMA synchronous = NORMAL")
         db.execute("PRAGMA foreign_keys = ON")

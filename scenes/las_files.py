@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .crs import crs_text, parse_crs, require_metric
-from .errors import CRSError, InputError
+from .errors import CRSError, InputError, OutputError
 from .points import PointCloud
 
 __all__ = ["LasHeader", "read_las_header", "read_points", "write_points"]
@@ -164,6 +164,17 @@ def read_points(
     return columns.cloud(stretch=not own)
 
 
+@contextmanager
+def _written(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Tell in words that the compressor could not write: it names neither file nor reason."""
+    from lazrs import LazrsError
+
+    try:
+        yield
+    except LazrsError as error:
+        raise OutputError(f"{Path(path).name} cannot be written ({error}): is there room on the disk?") from error
+
+
 def write_points(cloud: PointCloud, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
     """Write a point cloud as LAS 1.4 (LAZ when `path` ends in ``.laz``), coordinates rounded to 1 mm.
 
@@ -180,7 +191,7 @@ def write_points(cloud: PointCloud, path: str | os.PathLike[str], *, crs: str | 
         header.offsets = np.floor([cloud.x.min(), cloud.y.min(), cloud.z.min()])
     if crs is not None:
         header.add_crs(parse_crs(crs))
-    with laspy.open(os.fspath(path), mode="w", header=header) as writer:
+    with _written(path), laspy.open(os.fspath(path), mode="w", header=header) as writer:
         for start in range(0, len(cloud), CHUNK):
             part = cloud.take(slice(start, start + CHUNK))
             record = laspy.ScaleAwarePointRecord.zeros(len(part), header=header)

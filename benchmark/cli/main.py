@@ -85,6 +85,13 @@ def main() -> None:
         _tell(f"{error.filename or 'the output'}: {error.strerror or error}")
         _close_stdout()
         sys.exit(2)
+    except Exception as error:
+        import sqlite3  # here, since evaluate has no store
+
+        if not isinstance(error, sqlite3.Error):
+            raise
+        _tell(f"the results store cannot be written or read: {error}")
+        sys.exit(2)
 
 
 def _tell(sentence: str) -> None:

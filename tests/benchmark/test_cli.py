@@ -278,3 +278,16 @@ def test_files_are_written_before_a_table_that_nobody_reads(cli, misbehaving, tm
     assert (tmp_path / "out" / "leaderboard.csv").exists()
     assert (tmp_path / "out" / "report.html").exists()
     assert (tmp_path / "sweep.csv").exists()
+
+
+def test_a_store_without_room_is_one_sentence(monkeypatch, tmp_path):
+    import sqlite3
+
+    from command_line import roofbench
+
+    def full(*_):
+        raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr("roofbench.benchmark.store.Store.save_plan", full)
+    told = roofbench("run", "hamlet", "-d", "ndsm", "-j", 0, folder=tmp_path, expect=2).stderr
+    assert told == "Error: the results store cannot be written or read: database or disk is full\n"

@@ -211,3 +211,18 @@ def test_two_processes_write_to_one_store_at_once(tmp_path):
     assert [writer.wait() for writer in writers] == [0, 0]
     with Store(path) as store:
         assert sorted(row.seed for row in store.runs()) == list(range(90))
+
+
+@pytest.mark.parametrize("name", ["runs.sqlite", "what? 50% #1.sqlite"])
+def test_a_store_in_a_folder_that_cannot_be_written_is_read(tmp_path, monkeypatch, name):
+    from roofbench.benchmark import database
+
+    Store(tmp_path / name).close()
+    monkeypatch.setattr(database.os, "access", lambda *_: False)
+    with Store(tmp_path / name, must_exist=True) as store:
+        assert store.count_runs() == 0
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+    db = database.connect(tmp_path / name)
+    with pytest.raises(sqlite3.OperationalError, match="readonly"):
+        db.execute("CREATE TABLE more (id)")
+    db.close()

@@ -47,3 +47,18 @@ def test_a_full_disk_is_told_in_words_and_leaves_nothing(tmp_path):
     with pytest.raises(OutputError, match=r"big\.bin cannot be written: No space left"):
         write()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_points_that_find_no_room_are_told_in_words(tmp_path, monkeypatch):
+    import laspy
+    import small_scenes
+    from lazrs import LazrsError
+
+    from roofbench.scenes.las_files import write_points
+
+    def full(*_):
+        raise LazrsError("IoError: Failed to call write")
+
+    monkeypatch.setattr(laspy.LasWriter, "write_points", full)
+    with pytest.raises(OutputError, match=r"points\.laz cannot be written .*is there room on the disk"):
+        write_points(small_scenes.scene().points, tmp_path / "points.laz", crs=small_scenes.CRS)
