@@ -39,7 +39,9 @@ class StoreReader:
         """Return what was asked for last."""
         row = self._db.execute("SELECT content FROM plans ORDER BY id DESC LIMIT 1").fetchone()
         if row is None:
-            raise InputError(f"{self.path} holds no plan to resume: name a suite or scenes")
+            raise InputError(
+                f"{self.path} holds no plan to resume: name a suite or scenes; a sweep goes on by its own command"
+            )
         content: Mapping[str, Any] = json.loads(row["content"])
         return content
 
