@@ -54,14 +54,17 @@ def draw(power, path):
     colours = ("#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00")
     for number, axes in enumerate(figure.subplots(1, len(SPREADS), sharey=True)):
         for drop, line, colour in zip(DROPS[1:], power[number][1:], colours, strict=True):
-            axes.plot(SCENES, 100 * line, marker="o", markersize=3.5, color=colour, label=f"{100 * drop:g} points")
-        axes.set_title(f"differences scatter by {100 * SPREADS[number]:g} points", fontsize=10)
+            axes.plot(SCENES, 100 * line, marker="o", markersize=3.5, color=colour, label=f"{100 * drop:g}")
+        unit = "point" if SPREADS[number] == 0.01 else "points"
+        axes.set_title(f"differences scatter by {100 * SPREADS[number]:g} {unit}", fontsize=10)
         axes.set_xlabel("scenes")
-        axes.set_xticks(SCENES[::2])
+        axes.set_xticks([10, 16, 24, 30, 48])
         axes.grid(alpha=0.3)
         axes.set_ylim(-3, 103)
     figure.axes[0].set_ylabel("drops found, %")
-    figure.axes[-1].legend(title="drop of one index", fontsize=8, title_fontsize=8, loc="lower right")
+    figure.axes[-1].legend(
+        title="drop, points", fontsize=8, title_fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1)
+    )
     figure.savefig(path, dpi=110)
 
 
