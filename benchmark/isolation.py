@@ -38,7 +38,8 @@ THREAD_LIMITS = {
 }
 _PACKAGE = __package__
 _START = f"from {_PACKAGE}.isolation import serve; serve()"
-_WATCH_EVERY = 0.05  # seconds between looks at a worker's time and memory
+_WATCH_EVERY = 0.05  # seconds between looks at the memory of a worker that has a limit of it
+_LOOK_EVERY = 0.5  # seconds between looks at any other worker
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class IsolatedProcess:
             _send(process.stdin, task.encode())
             deadline = None if limits.seconds is None else started + limits.seconds
             receiver = _Receiver(process.stdout)
-            while (message := receiver.poll(_WATCH_EVERY)) is None:
+            while (message := receiver.poll(_pause(limits, deadline))) is None:
                 peak = highest_memory(process.pid)
                 if deadline is not None and time.monotonic() > deadline:
                     return self._failed(process, f"time limit of {limits.seconds:g} s passed", started, peak)
@@ -138,6 +139,12 @@ class IsolatedProcess:
                 start_new_session=True,  # Ctrl-C goes to the caller, who ends its workers in order
             )
         return self._process
+
+
+def _pause(limits: Limits, deadline: float | None) -> float:
+    """Return for how long to wait for an answer until the next look, seconds."""
+    pause = _LOOK_EVERY if limits.memory is None else _WATCH_EVERY
+    return pause if deadline is None else max(0.0, min(pause, deadline - time.monotonic()))
 
 
 def _too_much(peak: int, limit: int) -> str:
