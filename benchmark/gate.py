@@ -173,7 +173,7 @@ def compare_detector(
                 p = None if abs(effect) <= margin else worse[place] if effect < 0 else better[place]
                 share = seeds_share(before, after, index)
                 if share is not None and share >= 0.5:
-                    note = f"{label}: {share:.0%} of the scatter of {index.title} comes from seeds: more narrow it"
+                    note = f"{label}: seeds make {100 * share:.0f} % of the scatter of {index.title}: more narrow it"
         verdicts.append(
             IndexVerdict(
                 detector=label,
