@@ -1,7 +1,7 @@
 """How the result of the marked point process moves: the tables and figures of docs/mpp.md.
 
 Run by hand: ``python tests/benchmarks/study_mpp.py ablation --folders delft,ign`` and the same with ``sensitivity``,
-``points``, ``seeds``, ``ground``, ``detectors`` or ``shapes``; figures go to docs/images.
+``points``, ``seeds``, ``ground``, ``detectors``, ``shapes`` or ``pictures``; figures go to docs/images.
 
 Small presets of two scene seeds (one chain each) and the real scenes in folders (three chains). Q_l is object quality
 of the rectangles, Q_lp pixel quality, both in percent by the threshold-free evaluator (nearest matching, exact areas);
@@ -20,6 +20,7 @@ import numpy as np
 import shapely
 
 import roofbench as rb
+from roofbench.detectors.mpp.outcome import as_blocks
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 PRESETS = ("vaihingen-a-small", "toronto-a-small", "knox-small")
@@ -75,18 +76,15 @@ class Case:
 
 
 def indices(scene, seen, change, chain, *, real):
-    found = detect(seen, change, chain)
+    detector = rb.make_detector(f"mpp[{change}]")
+    found, prepared, rectangles = detector._run(seen, np.random.default_rng(chain))
     result = rb.evaluate(found, scene.reference, area=scene.area)
     by_object, pixel = result.object.quality, result.pixel.quality
     if real:
         # What `outline=blocks` gives, without a second run.
-        blocks = found.joined(0.5 * found.metadata["cell"]) if len(found) else found
+        blocks = as_blocks(prepared, rectangles, crs=scene.crs, record={}, source="mpp")
         pixel = rb.evaluate(blocks, scene.reference.joined(0.1), area=scene.area).pixel.quality
     return 100 * (by_object or 0), 100 * (pixel or 0)
-
-
-def detect(seen, change, chain):
-    return rb.make_detector(f"mpp[{change}]").detect(seen, np.random.default_rng(chain))
 
 
 @cache
@@ -158,8 +156,8 @@ def draw_sensitivity(rows, names):
             panel.axhspan(place - 0.5, place + 0.5, color="0.95", zorder=0)
     panels[0].set_yticks(range(len(order)), order)
     panels[0].set_ylim(-0.5, len(order) - 0.5)
-    panels[1].legend(fontsize=8, loc="lower right")
-    figure.savefig(IMAGES / "mpp-sensitivity.png", dpi=90)
+    panels[0].legend(fontsize=8, loc="lower left")
+    save(figure, "mpp-sensitivity.png")
 
 
 def thinned(density):
@@ -285,6 +283,31 @@ def shapes(folders):
         )
 
 
+def pictures(folders):
+    """Draw what the cells say, the convergence and the result of one run."""
+    from matplotlib.figure import Figure
+
+    scene = rb.open_scene(folders[0])
+    for step in rb.make_detector("mpp").steps(scene, np.random.default_rng(0)):
+        name = step.name.split("-", 1)[1]
+        if name in ("evidence", "convergence", "buildings"):
+            figure = Figure(figsize=(7, 6.4), layout="constrained")
+            step.draw(figure)
+            save(figure, f"mpp-{name}.png")
+
+
+def save(figure, name):
+    """Save a picture of less than 300 kB: with 256 colours, then smaller."""
+    from PIL import Image as Picture
+
+    for dpi in (110, 100, 90, 75):
+        figure.savefig(IMAGES / name, dpi=dpi)
+        with Picture.open(IMAGES / name) as picture:
+            picture.convert("RGB").quantize(64).save(IMAGES / name, optimize=True)
+        if (IMAGES / name).stat().st_size < 290_000:
+            return
+
+
 STUDIES = {
     "ablation": ablation,
     "sensitivity": sensitivity,
@@ -293,6 +316,7 @@ STUDIES = {
     "ground": ground,
     "detectors": detectors,
     "shapes": shapes,
+    "pictures": pictures,
 }
 
 
