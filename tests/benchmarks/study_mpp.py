@@ -3,7 +3,7 @@
 Run by hand: ``python tests/benchmarks/study_mpp.py ablation --folders delft,ign`` and the same with ``sensitivity``,
 ``points``, ``seeds``, ``ground``, ``detectors``, ``shapes`` or ``pictures``; figures go to docs/images.
 
-Small presets of two scene seeds (one chain each) and the real scenes in folders (three chains). Q_l is object quality
+Small presets of one or two scene seeds and the real scenes in folders (one chain, or three). Q_l is object quality
 of the rectangles, Q_lp pixel quality, both in percent by the threshold-free evaluator (nearest matching, exact areas);
 of a real scene Q_lp is that of blocks (``outline=blocks``) against the reference joined over gaps below 0.1 m. The
 detector never sees classes, and sees no image.
@@ -109,7 +109,7 @@ def line(label, values, base=None):
 
 
 def ablation(folders):
-    chosen = cases(folders)
+    chosen = cases(folders, chains=1)
     head(chosen, "change")
     base = None
     for label, change in ABLATIONS.items():
