@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
@@ -26,6 +27,8 @@ from .streams import Draws, stream
 __all__ = ["Town", "build"]
 
 _DRAWS = 96
+#: Least distance of two buildings, metres.
+_APART = 0.3
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,7 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
     solids: list[Solid] = []
     garages: list[tuple[int, Solid]] = []
     built = np.zeros(len(sites), dtype=bool)
+    taken = _Taken(len(sites) * 8)
     number = counted = 0
     for site in np.argsort(sites.mark, kind="stable"):
         if counted == recipe.buildings:
@@ -74,9 +78,9 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
         compose = {HALLS: _hall, TOWERS: _tower}.get(zone, compose_house)
         groups = compose(parcel, recipe, draws)
         # Without its house a parcel has no garage either.
-        if not groups or not all(_inside(part, recipe) for part in groups[0]):
+        if not groups or not _fits(groups[0], taken, recipe):
             continue
-        groups = [group for group in groups if all(_inside(part, recipe) for part in group)]
+        groups = [group for group in groups if _fits(group, taken, recipe)]
         built[site] = True
         for rank, whole in enumerate(groups):
             group, worth = _within_quota(whole, recipe.buildings - counted, recipe.counted)
@@ -85,6 +89,7 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
             _paint(group, rank, zone, recipe, Draws(colours[site][rank * 6 :]), Draws(greens[site][rank * 2 :]))
             floor = float(terrain.sample(group[0].x, group[0].y))
             furniture = furnish(group, zone, Draws(roofs[site][rank * 48 :])) if rank == 0 else []
+            taken.add(group)
             for solid in (*group, *furniture):
                 solid.owner, solid.base = number, floor
                 solids.append(solid)
@@ -93,11 +98,13 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
             number += 1
             counted += worth
     if counted < recipe.buildings:
-        what = "" if recipe.counted == "buildings" else f" ({recipe.counted} of the reference)"
+        what, more = "buildings", ""
+        if recipe.counted != "buildings":
+            what, more = f"buildings ({recipe.counted} of the reference)", "lower plain_plans, raise outbuildings "
         raise ParameterError(
-            f"buildings{what} must be at most {counted} on {recipe.width:g} x {recipe.height:g} m with parcels of "
+            f"{what} must be at most {counted} on {recipe.width:g} x {recipe.height:g} m with parcels of "
             f"{recipe.parcel_width:g} x {recipe.parcel_depth:g} m and this seed, not {recipe.buildings}: "
-            "widen the extent, narrow the parcels or ask for fewer"
+            f"widen the extent, narrow the parcels, {more}or ask for fewer"
         )
     return Town(tuple(solids), built, tuple(garages))
 
@@ -113,6 +120,31 @@ def _within_quota(building: list[Solid], quota: int, counted: str) -> tuple[list
         building = building[:-1]
         worth = count_entities(building)
     return building, worth
+
+
+class _Taken:
+    """The ground that buildings stand on: where streets wind, parcels of two streets can reach into each other."""
+
+    def __init__(self, room: int) -> None:
+        self._circles = np.empty((room, 3))
+        self._outlines: list[shapely.Polygon] = []
+
+    def add(self, building: list[Solid]) -> None:
+        """Take the ground below the parts of a building."""
+        for part in building:
+            self._circles[len(self._outlines)] = part.x, part.y, math.hypot(part.length, part.width) / 2
+            self._outlines.append(shapely.Polygon(part.corners()))
+
+    def touches(self, part: Solid) -> bool:
+        """Return whether a part would come within `_APART` of another building."""
+        x, y, reach = self._circles[: len(self._outlines)].T
+        near = np.hypot(x - part.x, y - part.y) < reach + math.hypot(part.length, part.width) / 2 + 2 * _APART
+        outline = shapely.Polygon(part.corners(_APART))
+        return any(outline.intersects(self._outlines[index]) for index in np.flatnonzero(near))
+
+
+def _fits(building: list[Solid], taken: _Taken, recipe: SceneParameters) -> bool:
+    return all(_inside(part, recipe) and not taken.touches(part) for part in building)
 
 
 def _inside(solid: Solid, recipe: SceneParameters) -> bool:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["GENERATOR", "make_scene", "scene_of"]
 
 #: Version of the generator: raised whenever the same recipe and seed give another scene.
-GENERATOR = 4
+GENERATOR = 5
 #: Lower left corner of every synthetic scene, metres.
 ORIGIN = (320000.0, 5810000.0)
 

@@ -25,7 +25,7 @@ The references of Fairfield, Moonee Ponds and Knox were measured in the orthoima
 
 What the numbers count
 ----------------------
-The papers say "buildings" and "outlines"; but for Moonee Ponds and Knox the numbers are those of *entities*
+The papers say "buildings" and "outlines"; except at Moonee Ponds and Knox the numbers are those of *entities*
 (rectangles, see `entities`), so the presets count rectangles:
 
 - 2010, section 4.1: the reference set consists of rectangular entities; section 4.3: "70, 62 and 60 buildings" formed

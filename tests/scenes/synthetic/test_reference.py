@@ -54,16 +54,28 @@ def test_references_are_rectangles_inside_the_extent(pair):
     assert shapely.box(*scene.extent).buffer(1).contains(shapely.union_all(scene.reference.polygons))
 
 
+def overlaps_of_two_buildings(reference):
+    polygons, building = reference.polygons, reference.building_ids
+    first, second = shapely.STRtree(polygons).query(polygons, predicate="intersects")
+    area = shapely.area(shapely.intersection(polygons[first], polygons[second]))
+    return area[building[first] != building[second]]
+
+
 def test_parts_of_one_building_overlap_and_those_of_two_do_not(pair):
     _, scene = pair
     polygons, building = scene.reference.polygons, scene.reference.building_ids
-    first, second = shapely.STRtree(polygons).query(polygons, predicate="intersects")
-    area = shapely.area(shapely.intersection(polygons[first], polygons[second]))
-    different = building[first] != building[second]
-    assert not np.any(different & (area > 1e-6))
+    assert not np.any(overlaps_of_two_buildings(scene.reference) > 1e-6)
     for number in np.unique(building):
         parts = polygons[building == number]
         assert shapely.union_all(parts).geom_type == "Polygon", "a building is in one piece"
+
+
+@pytest.mark.parametrize("name", ["knox", "vaihingen-a"])
+def test_where_streets_wind_buildings_of_two_streets_do_not_meet(name):
+    for seed in (2, 3):
+        assert not np.any(
+            overlaps_of_two_buildings(rb.make_scene(name, seed=seed, digitised="ground").reference) > 1e-6
+        )
 
 
 def test_houses_have_one_to_four_rectangles():
