@@ -12,8 +12,12 @@ rim
 superstructure
     A patch whose rim is lower roof nearly all round. A house in a row is none: its front and back stand free.
 
-A superstructure is lowered to the roof around it before roofs are fitted, so that it neither spoils the fit nor is cut
-out as a building of its own. Towers on towers are lowered from the top down.
+furniture
+    A small rough place with roof nearly all round.
+
+Storeys of frames are lowered first (`frames`), then furniture and superstructures, towers on towers from the top down:
+each cell to the level of the roof beside it, before roofs are fitted, so that it neither spoils the fit nor is cut out
+as a building of its own.
 """
 
 from __future__ import annotations
@@ -229,8 +233,6 @@ def _fill_rough(height, state, labels, share, most):  # type: ignore[no-untyped-
 def _lower(height, state, labels, count, share, step):  # type: ignore[no-untyped-def]
     """Lower the superstructures in place; return whether there was any."""
     rows, columns = state.shape
-    size = np.zeros(count + 1, dtype=np.int64)
-    level = np.zeros(count + 1, dtype=np.int64)
     rim = np.zeros(count + 1, dtype=np.int64)
     below = np.zeros(count + 1, dtype=np.int64)
     for r in range(rows):
@@ -238,8 +240,6 @@ def _lower(height, state, labels, count, share, step):  # type: ignore[no-untype
             label = labels[r, c]
             if label == 0:
                 continue
-            size[label] += 1
-            level[label] += height[r, c]
             for side in range(4):
                 i = r + (1 if side == 0 else (-1 if side == 1 else 0))
                 j = c + (1 if side == 2 else (-1 if side == 3 else 0))
