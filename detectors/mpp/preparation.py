@@ -22,6 +22,7 @@ from .background import Background, estimate_background, score_cells, textures
 from .candidates import propose_boxes
 from .cells import Cells, cell_size, make_cells
 from .energy import Model, own_energies
+from .memory import give_back
 from .superstructures import lower_superstructures
 from .tables import LONGEST, Tables, make_tables
 from .workers import Workers
@@ -79,6 +80,7 @@ def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers)
     if parameters.data_births > 0 or parameters.start == "greedy":
         least = math.ceil(6 / cell**2)
         boxes = propose_boxes(height, fitted, steps=(0.4, 1.0, 1000.0), least_cells=least, workers=workers)
+    give_back()
     tables = make_tables(height, fitted, score, workers=workers)
     model = _model(parameters, cell)
     energies = own_energies(tables.small, tables.large, boxes, model)

@@ -198,7 +198,7 @@ def draw(curves, path):
             panel.errorbar(
                 values[:, 0], values[:, column], yerr=values[:, column + 2], marker="o", capsize=2, label=name
             )
-            for row in values[values[:, 5] >= 0.25]:
+            for row in values[np.isin(values[:, 5], (0.25, 1, 2, 4))]:
                 place = (row[0], row[column])
                 panel.annotate(f"{row[5]:g}", place, xytext=(0, 7), textcoords="offset points", fontsize=8, ha="center")
         panel.set_title(title, fontsize=10)
