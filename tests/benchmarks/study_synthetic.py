@@ -18,6 +18,7 @@ from roofbench.scenes.synthetic import SceneParameters, preset_names
 PICTURES = (
     ("fairfield", {}),
     ("fairfield-1", {}),
+    ("fairfield-2", {}),
     ("fairfield-3", {}),
     ("fairfield-3-small", {}),
     ("moonee-ponds", {}),
@@ -25,7 +26,9 @@ PICTURES = (
     ("knox", {}),
     ("knox-small", {}),
     ("toronto-a", {}),
+    ("toronto-b", {}),
     ("vaihingen-a", {}),
+    ("vaihingen-b", {}),
     ("vaihingen-a-small", {"garage_rows": 0.2}),
 )
 # Where an axis shows: on knox-small trees stand at roof height and a first pulse does not pierce them; elsewhere they
