@@ -143,6 +143,17 @@ def scan(small, large, rectangle):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def _with_part(sums, small, large, row, begin, end, x0, y0):  # type: ignore[no-untyped-def]
+    """Return the sums of 1, x, y, h, xh and yh, those over a part of a row added; nothing where it is empty."""
+    if end <= begin:
+        return sums
+    n, x, y, h, xh, yh = sums
+    n_r, x_r, _, h_r, xh_r, _ = part_sums(small, large, row, begin, end, x0)
+    j = row - y0
+    return n + n_r, x + x_r, y + j * n_r, h + h_r, xh + xh_r, yh + j * h_r
+
+
+@njit(cache=True, nogil=True)
 def scan_halves(small, large, rectangle):  # type: ignore[no-untyped-def]
     """Return the sums of u and uh over the cells with u > 0, and of v and vh over those with v > 0."""
     rows, columns = small.shape[0], small.shape[1] - 1
@@ -152,8 +163,8 @@ def scan_halves(small, large, rectangle):  # type: ignore[no-untyped-def]
     right_u, right_v = cos > 0.0, sin < 0.0
     x0, y0 = np.int64(math.floor(cx)), np.int64(math.floor(cy))
     zero = np.int64(0)
-    n_u, x_u, y_u, h_u, xh_u, yh_u = zero, zero, zero, zero, zero, zero
-    n_v, x_v, y_v, h_v, xh_v, yh_v = zero, zero, zero, zero, zero, zero
+    by_u = (zero, zero, zero, zero, zero, zero)
+    by_v = by_u
     for row in range(max(_first_cell(cy - tall), 0), min(_first_cell(cy + tall), rows)):
         dy = row + 0.5 - cy
         lo = max(dy * slope_u - reach_u, dy * slope_v - reach_v)
@@ -163,36 +174,23 @@ def scan_halves(small, large, rectangle):  # type: ignore[no-untyped-def]
         left, right = min(max(_first_cell(cx + lo), 0), columns), min(max(_first_cell(cx + hi), 0), columns)
         if right <= left or small[row, right, 0] == small[row, left, 0]:
             continue
-        j = row - y0
         begin, end = left, right
         if abs(cos) <= 1e-12:
             end = right if dy * sin > 0.0 else left
         else:
             cut = min(max(_first_cell(cx + min(max(dy * slope_u, lo), hi)), left), right)
             begin, end = (cut, right) if right_u else (left, cut)
-        if end > begin:
-            n_r, x_r, _, h_r, xh_r, _ = part_sums(small, large, row, begin, end, x0)
-            n_u += n_r
-            x_u += x_r
-            y_u += j * n_r
-            h_u += h_r
-            xh_u += xh_r
-            yh_u += j * h_r
+        by_u = _with_part(by_u, small, large, row, begin, end, x0, y0)
         begin, end = left, right
         if abs(sin) <= 1e-12:
             end = right if dy * cos > 0.0 else left
         else:
             cut = min(max(_first_cell(cx + min(max(dy * slope_v, lo), hi)), left), right)
             begin, end = (cut, right) if right_v else (left, cut)
-        if end > begin:
-            n_r, x_r, _, h_r, xh_r, _ = part_sums(small, large, row, begin, end, x0)
-            n_v += n_r
-            x_v += x_r
-            y_v += j * n_r
-            h_v += h_r
-            xh_v += xh_r
-            yh_v += j * h_r
+        by_v = _with_part(by_v, small, large, row, begin, end, x0, y0)
     ox, oy = x0 + 0.5 - cx, y0 + 0.5 - cy
+    n_u, x_u, y_u, h_u, xh_u, yh_u = by_u
+    n_v, x_v, y_v, h_v, xh_v, yh_v = by_v
     return (
         (x_u + ox * n_u) * cos + (y_u + oy * n_u) * sin,
         0.01 * ((xh_u + ox * h_u) * cos + (yh_u + oy * h_u) * sin),
