@@ -17,6 +17,16 @@ def cells_in_box(box: np.ndarray, rows: int, columns: int) -> np.ndarray:
     return (u >= box[U0]) & (u < box[U1]) & (v >= box[V0]) & (v < box[V1])
 
 
+def distances(points, chosen: np.ndarray, grid) -> np.ndarray:
+    """Distance of each cell to the nearest cell that holds a chosen point, metres."""
+    row, column = np.divmod(np.unique(grid.cells(points.x[chosen], points.y[chosen])[0]), grid.columns)
+    rows, columns = np.mgrid[0 : grid.rows, 0 : grid.columns]
+    out = np.full(grid.shape, np.inf)
+    for r, c in zip(row, column, strict=True):
+        out = np.minimum(out, np.hypot(rows - r, columns - c) * grid.gsd)
+    return out
+
+
 def accumulated_distance(curve: np.ndarray, chord: int, closed: bool) -> np.ndarray:
     """CPDA by its definition, point by point and chord by chord."""
     n = len(curve)

@@ -72,9 +72,15 @@ class LineDetector(Detector):
     height: float = parameter(
         2.5, unit="m", minimum=0, doc="least height above ground of a building", source="2010, 3.2"
     )
+    marking: str = parameter(
+        "nearest", choices=("nearest", "squares"),
+        doc="what a place in the masks is: what the nearest point is, or the printed square around each point",
+        source="2010, 3.2; reading",
+    )  # fmt: skip
     neighbourhood: float | None = parameter(
         None, unit="m", minimum=0,
-        doc="side of the square that a point marks in the masks; none: 1.5 point spacings, the paper's 5 px of 0.15 m",
+        doc="side of the square that a point marks, and how far off the nearest one counts; none: 1.5 point spacings, "
+        "the paper's 5 px of 0.15 m",
         source="2010, 3.2",
     )  # fmt: skip
     minimum_side: float = parameter(
@@ -296,6 +302,7 @@ class LineDetector(Detector):
             ground + self.height,
             grid,
             neighbourhood=1.5 * spacing if self.neighbourhood is None else self.neighbourhood,
+            nearest=self.marking == "nearest",
         )
         cover = Cover(prefix_sums(masks.primary), vegetation_prefix(image, self.vegetation), self._entropy(image))
         bands = [image.bands.index(name) for name in ("red", "green", "blue")]

@@ -10,6 +10,10 @@ secondary mask
     Black near points above the threshold: the filled areas. It bounds how far a building may be extended.
 neighbourhood
     Side of the square that a point marks; it follows the point spacing (5 x 5 pixels of 0.15 m for points 0.5 m apart).
+nearest point
+    Of all points that are not at the threshold itself. Squares of low points reach into the roofs beside them by as
+    much as the points happen to lie near the wall; where the nearest point decides, the border between ground and roof
+    is half-way between a low and a high point, on average where it is.
 coverage
     Where there are points at all, voids filled up to the size of a large roof or pond.
 
@@ -36,6 +40,8 @@ __all__ = ["Masks", "build_masks", "ground_heights", "point_spacing"]
 _COVERAGE_CELL = 2.5
 #: A gap in the points narrower than this is a void inside the coverage, metres.
 _WIDEST_VOID = 50.0
+#: Rows of the masks that are made at a time: distances take eight times the memory of a mask.
+_BAND = 512
 #: Distance between successive bins of the height histogram of a tile (conference version), metres.
 _HEIGHT_BIN = 2.0
 
@@ -156,14 +162,41 @@ def ground_heights(points: PointCloud, dem: Elevation | None, *, method: str, ti
     return _tile_dem(points, dem, tile_side) if method == "tile-dem" else _point_dem(points, dem)
 
 
-def _mark(points: PointCloud, chosen: NDArray[np.bool_], grid: Grid, side: int) -> NDArray[np.uint8]:
+def _hits(points: PointCloud, chosen: NDArray[np.bool_], grid: Grid) -> NDArray[np.uint8]:
     index, inside = grid.cells(points.x[chosen], points.y[chosen])
-    marks = np.zeros(grid.rows * grid.columns, dtype=np.uint8)
-    marks[index[inside]] = 1
-    return np.asarray(cv2.dilate(marks.reshape(grid.shape), np.ones((side, side), np.uint8)), dtype=np.uint8)
+    hits = np.zeros(grid.rows * grid.columns, dtype=np.uint8)
+    hits[index[inside]] = 1
+    return hits.reshape(grid.shape)
 
 
-def build_masks(points: PointCloud, thresholds: NDArray[np.float64], grid: Grid, *, neighbourhood: float) -> Masks:
+def _squares(hits: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
+    return np.asarray(cv2.dilate(hits, np.ones((side, side), np.uint8)), dtype=np.uint8)
+
+
+def _nearest(
+    low: NDArray[np.uint8], high: NDArray[np.uint8], reach: float
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return where the nearest point is low and where it is high, no farther than `reach` pixels; a tie is low.
+
+    Distances are those of cv2's 5 x 5 chamfer mask, within 2 % of the exact ones.
+    """
+    is_low, is_high = np.empty_like(low), np.empty_like(high)
+    halo = math.ceil(reach) + 1
+    for top in range(0, len(low), _BAND):
+        first, bottom = max(top - halo, 0), min(top + _BAND, len(low))
+        part = slice(first, bottom + halo)
+        to_low, to_high = (
+            cv2.distanceTransform(1 - hits[part], cv2.DIST_L2, cv2.DIST_MASK_5)[top - first : bottom - first]
+            for hits in (low, high)
+        )
+        is_low[top:bottom] = (to_low <= to_high) & (to_low <= reach)
+        is_high[top:bottom] = (to_high < to_low) & (to_high <= reach)
+    return is_low, is_high
+
+
+def build_masks(
+    points: PointCloud, thresholds: NDArray[np.float64], grid: Grid, *, neighbourhood: float, nearest: bool
+) -> Masks:
     """Build both masks.
 
     Parameters
@@ -172,11 +205,19 @@ def build_masks(points: PointCloud, thresholds: NDArray[np.float64], grid: Grid,
         Height threshold of each point, metres; a point without one (NaN) marks nothing.
     neighbourhood : float
         Side of the square that a point marks, metres.
+    nearest : bool
+        Whether the primary mask is white where the nearest point is low, and the secondary mask also black where it is
+        high, each no farther than `neighbourhood`; else both are made of squares alone, as printed.
     """
     side = 2 * max(0, round((neighbourhood / grid.gsd - 1) / 2)) + 1
     coverage = _coverage(points, grid)
-    primary = _mark(points, points.z < thresholds, grid, side)
+    low, high = _hits(points, points.z < thresholds, grid), _hits(points, points.z > thresholds, grid)
+    secondary = _squares(high, side)
+    if nearest:
+        primary, filled = _nearest(low, high, neighbourhood / grid.gsd)
+        secondary |= filled
+    else:
+        primary = _squares(low, side)
     np.subtract(1, primary, out=primary)
     primary &= coverage
-    secondary = _mark(points, points.z > thresholds, grid, side)
     return Masks(primary, secondary, coverage, side)

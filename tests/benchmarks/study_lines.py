@@ -25,6 +25,7 @@ COLUMNS = ("C_m", "C_r", "Q_l", "M_d", "D_o", "C_rd", "C_rr", "C_mp", "C_rp", "Q
 
 ABLATIONS = {
     "original": (
+        "marking=squares",
         "ground=point-dem",
         "ground=tile-mode",
         "vegetation=pseudo-ndvi",
@@ -40,6 +41,7 @@ ABLATIONS = {
         "compare=whole",
     ),
     "improved": (
+        "marking=squares",
         "ground=tile-dem",
         "entropy_threshold=0.3",
         "vegetation_side=inside",

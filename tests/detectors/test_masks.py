@@ -1,5 +1,6 @@
 """Masks and ground heights: what each point marks, and which height is its ground."""
 
+import naive_lines
 import numpy as np
 import pytest
 
@@ -18,7 +19,7 @@ def test_a_low_point_marks_five_by_five_pixels_white_and_a_high_one_black():
     x, y = (values.ravel() for values in np.meshgrid(np.arange(1.0, 30, 2), np.arange(1.0, 30, 2)))
     level = np.full(len(x), 2.5)  # At the threshold: covers the scene and marks nothing.
     points = cloud([15.0, 7.575, *x], [15.0, 22.425, *y], [0.0, 5.0, *level])
-    masks = build_masks(points, np.full(len(points), 2.5), GRID, neighbourhood=0.75)
+    masks = build_masks(points, np.full(len(points), 2.5), GRID, neighbourhood=0.75, nearest=False)
     assert masks.neighbourhood == 5
     white = np.argwhere((masks.primary == 0) & (masks.coverage == 1))
     assert len(white) == 25
@@ -28,24 +29,76 @@ def test_a_low_point_marks_five_by_five_pixels_white_and_a_high_one_black():
 
 
 def test_a_point_at_the_threshold_marks_nothing():
-    masks = build_masks(cloud([15.0], [15.0], [2.5]), np.array([2.5]), GRID, neighbourhood=0.75)
+    masks = build_masks(cloud([15.0], [15.0], [2.5]), np.array([2.5]), GRID, neighbourhood=0.75, nearest=True)
     assert masks.secondary.sum() == 0
     assert (masks.primary == masks.coverage).all()
 
 
-def test_beyond_the_points_nothing_is_black_but_a_void_within_them_is():
+@pytest.mark.parametrize("nearest", [True, False])
+def test_beyond_the_points_nothing_is_black_but_a_void_within_them_is(nearest):
     x, y = (values.ravel() for values in np.meshgrid(np.arange(0.25, 15, 0.5), np.arange(0.25, 30, 0.5)))
     void = (abs(x - 7) < 4) & (abs(y - 15) < 4)
     points = cloud(x[~void], y[~void], np.zeros((~void).sum()))
-    masks = build_masks(points, np.full(len(points), 2.5), GRID, neighbourhood=0.75)
+    masks = build_masks(points, np.full(len(points), 2.5), GRID, neighbourhood=0.75, nearest=nearest)
     assert masks.primary[:, 120:].sum() == 0
     assert masks.primary[90:110, 35:58].all()
+
+
+def random_roof(seed, count):
+    """Points at random places of 30 m x 30 m; those of a roof of 16 m x 8 m are 4 m high."""
+    x, y = np.random.default_rng(seed).uniform(0, 30, (2, count))
+    return cloud(x, y, np.where((abs(x - 15) < 8) & (abs(y - 15) < 4), 4.0, 0.0))
+
+
+def test_each_place_is_what_the_nearest_point_is():
+    points = random_roof(seed=8, count=500)
+    masks = build_masks(points, np.full(500, 2.5), GRID, neighbourhood=1.5, nearest=True)
+    squares = build_masks(points, np.full(500, 2.5), GRID, neighbourhood=1.5, nearest=False)
+    to_low, to_high = (naive_lines.distances(points, chosen, GRID) for chosen in (points.z < 2.5, points.z > 2.5))
+    far = np.minimum(to_low, to_high)
+    clear = (abs(to_low - to_high) > 0.03 * far) & (abs(far - 1.5) > 0.05) & (masks.coverage == 1)
+    white = (to_low < to_high) & (to_low < 1.5)
+    assert (masks.primary[clear] == ~white[clear]).all()
+    black = (squares.secondary == 1) | ((to_high < to_low) & (to_high < 1.5))
+    assert (masks.secondary[clear] == black[clear]).all()
+    assert clear.mean() > 0.9
+
+
+def test_masks_made_in_bands_have_no_seams():
+    points = random_roof(seed=9, count=900)
+    fine = Grid(0.0, 30.0, 30 / 1200, 1200, 1200)
+    masks = build_masks(points, np.full(900, 2.5), fine, neighbourhood=1.5, nearest=True)
+    upside_down = cloud(points.x, 30 - points.y, points.z)
+    turned = build_masks(upside_down, np.full(900, 2.5), fine, neighbourhood=1.5, nearest=True)
+    # Points on the border of two cells fall to one side or the other.
+    assert (masks.primary != turned.primary[::-1]).mean() < 0.01
+    assert np.abs((masks.primary != turned.primary[::-1]).mean(axis=1)).max() < 0.03
+
+
+def test_squares_leave_holes_and_eat_into_a_roof_where_the_nearest_point_does_not():
+    px, py = np.meshgrid((np.arange(200) + 0.5) * 0.15, 30 - (np.arange(200) + 0.5) * 0.15)
+    roof = (abs(px - 15) < 8) & (abs(py - 15) < 4)
+    column, row = np.mgrid[0:30, 0:30].reshape(2, -1)
+    black: dict[bool, list[float]] = {True: [], False: []}
+    wrong: dict[bool, list[float]] = {True: [], False: []}
+    for seed in range(20):
+        x, y = np.array([column, row]) + np.random.default_rng(seed).uniform(0, 1, (2, 900))
+        points = cloud(x, y, np.where((abs(x - 15) < 8) & (abs(y - 15) < 4), 4.0, 0.0))
+        for nearest in (True, False):
+            masks = build_masks(points, np.full(900, 2.5), GRID, neighbourhood=1.5, nearest=nearest)
+            black[nearest].append(masks.primary[roof].mean())
+            wrong[nearest].append((masks.primary != roof).sum() * GRID.gsd**2)
+    assert np.mean(black[True]) > 0.94
+    assert np.mean(black[False]) < 0.91
+    assert np.mean(wrong[True]) < 0.5 * np.mean(wrong[False])
 
 
 def test_the_neighbourhood_is_an_odd_number_of_pixels_at_any_ground_sampling_distance():
     for gsd, side in ((0.15, 5), (0.1, 7), (0.5, 1), (0.05, 15)):
         grid = Grid(0.0, 30.0, gsd, 60, 60)
-        assert build_masks(cloud([1.0], [29.0], [0.0]), np.array([2.5]), grid, neighbourhood=0.75).neighbourhood == side
+        point = cloud([1.0], [29.0], [0.0])
+        masks = build_masks(point, np.array([2.5]), grid, neighbourhood=0.75, nearest=False)
+        assert masks.neighbourhood == side
 
 
 def test_point_spacing_counts_pulses_and_not_returns():
