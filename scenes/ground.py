@@ -41,6 +41,8 @@ _SUPPORT_HEIGHT, _SUPPORT, _SUPPORT_SHARE = 1.0, 3, 0.05
 _TREND_BLOCK = 5.0
 #: Windows up to this radius in metres remove what they remove, walls or not: shrubs and crowns have ragged borders.
 _NARROW = 6.0
+#: Gaps of the points wider than twice this, metres, are no surface between what lies around: water, the scene's rim.
+_GAP = 3.0
 #: Points put on the grid at a time, so that a large cloud is not copied.
 _CHUNK = 2_000_000
 #: Share of the border of a wide object that must be wall.
@@ -88,7 +90,7 @@ def ground_surface(
         return Elevation(lowest, grid)
     trend = _trend(lowest, grid.gsd, largest_object)
     relief = lowest - trend
-    objects = _objects(fill_unknown(relief), grid.gsd, largest_object, slope, wall_height)
+    objects = _objects(relief, grid.gsd, largest_object, slope, wall_height)
     ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
     # Cut hill tops and the feet of shrubs come back; what they add lets the next round reach a little further.
     for _ in range(2):
@@ -290,6 +292,8 @@ def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
         above = height - trend
         spread = 1.4826 * np.median(np.abs(above[known])) + 0.1
         weight = known / (1 + (np.where(above > 0, 2, 0.5) * above / spread) ** 2)
+    # Planes run away where there is nothing around that they could be fitted to.
+    trend = fill_unknown(np.where(known, trend, np.nan).astype(np.float32)).astype(np.float64)
     # Samples at the border lie beyond the centres of the outer blocks.
     outer = np.pad(trend, 1, mode="reflect", reflect_type="odd") if min(trend.shape) > 1 else np.pad(trend, 1, "edge")
     row, column = np.indices(surface.shape)
@@ -327,16 +331,20 @@ def _objects(relief: _Floats, cell: float, largest: float, slope: float, wall_he
     import cv2
 
     objects = np.zeros(relief.shape, dtype=bool)
-    surface, walls = relief, None
+    # Gaps within the scene are filled, and what was measured nowhere around is like what lies beyond the scene.
+    beyond = _beyond(np.isnan(relief), _GAP / cell)
+    surface, walls = fill_unknown(relief), None
     for radius in _radii(largest / 2 / cell, min(relief.shape)):
         if radius * cell > _NARROW and walls is None:
             # Narrower windows have taken the trees off: what steps down in the surface between them is a roof.
             walls = _wall_cells(surface, wall_height)
         window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * radius + 1, 2 * radius + 1))
-        opened = cv2.morphologyEx(surface, cv2.MORPH_OPEN, window)
-        removed = surface - opened > np.minimum(0.3 + slope * radius * cell, 2.0)
+        # Windows centred beyond hang over: they would hold a roof's rim and nothing else.
+        lowest = cv2.erode(np.where(beyond, np.float32(np.inf), surface), window)
+        opened = cv2.dilate(np.where(beyond, np.float32(-np.inf), lowest), window)
+        removed = ~beyond & (surface - opened > np.minimum(0.3 + slope * radius * cell, 2.0))
         if walls is not None:
-            removed = _standing(removed, walls)
+            removed = _standing(removed, walls, beyond)
             # The rest of a roof of which a wing is gone stands on the cut, too.
             walls |= cv2.dilate(removed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         objects |= removed
@@ -367,12 +375,22 @@ def _wall_cells(relief: _Floats, height: float) -> _Mask:
     return np.asarray(fall - rise / 2 > height)
 
 
-def _standing(removed: _Mask, walls: _Mask) -> _Mask:
-    """Return the removed cells of the regions whose border is wall."""
+def _beyond(unknown: _Mask, reach: float) -> _Mask:
+    """Return the unknown cells of gaps that a square reaching so many cells to all sides fits into."""
+    import cv2
+
+    # What lies around the grid is unknown, too.
+    window = np.ones((2 * round(reach) + 1,) * 2, np.uint8)
+    shrunk = cv2.erode(unknown.astype(np.uint8), window, borderValue=1)
+    return np.asarray((cv2.dilate(shrunk, window) > 0) & unknown)
+
+
+def _standing(removed: _Mask, walls: _Mask, beyond: _Mask) -> _Mask:
+    """Return the removed cells of the regions whose border is wall; where nothing is known beyond it is no border."""
     import cv2
 
     count, labels = cv2.connectedComponents(removed.astype(np.uint8), connectivity=4)
-    inner = cv2.erode(removed.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1)
+    inner = cv2.erode((removed | beyond).astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1)
     border = removed & (inner == 0)
     length = np.bincount(labels[border], minlength=count)
     walled = np.bincount(labels[border & walls], minlength=count)
