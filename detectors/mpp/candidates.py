@@ -21,9 +21,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .patches import cells_of_patches, label_patches
 from .workers import ALONE, Workers
 
-__all__ = ["label_patches", "propose_boxes"]
+__all__ = ["propose_boxes"]
 
 #: Angles tried in a quarter turn.
 _ANGLES = 30
@@ -35,7 +36,7 @@ _FILLED = 0.85
 
 def propose_boxes(
     height: NDArray[np.int32],
-    roof: NDArray[np.bool_],
+    roof: NDArray[np.bool_] | NDArray[np.int32],
     *,
     steps: tuple[float, ...],
     least_cells: int,
@@ -47,72 +48,41 @@ def propose_boxes(
     ----------
     height : ndarray of int32, shape (rows, columns)
         Centimetres.
-    roof : ndarray of bool, shape (rows, columns)
+    roof : ndarray of bool or int32, shape (rows, columns)
+        Not 0 where there is roof.
     steps : tuple of float
         Limits in metres, rising.
     least_cells : int
         Smaller patches and pieces are left out.
     workers : Workers
     """
-    labelled = workers.map(lambda step: label_patches(height, roof, round(100 * step)), steps)
-    finer = [np.zeros((1, 1), dtype=np.int32), *(labels for labels, _ in labelled)]
-    jobs = [(labels, count, fine, least_cells) for (labels, count), fine in zip(labelled, finer, strict=False)]
-    boxes = np.concatenate([np.empty((0, 5)), *workers.map(lambda job: _boxes(*job), jobs)])
-    return boxes[np.sort(np.unique(np.round(boxes, 3), axis=0, return_index=True)[1])]
+    boxes, finer = [np.empty((0, 5))], np.zeros((1, 1), dtype=np.int32)
+    for step in steps:
+        labels, count = label_patches(height, roof, round(100 * step), workers=workers)
+        boxes += _boxes_of_patches(labels, count, finer, least_cells, workers)
+        finer = labels
+    together = np.concatenate(boxes)
+    return together[np.sort(np.unique(np.round(together, 3), axis=0, return_index=True)[1])]
+
+
+def _boxes_of_patches(
+    labels: NDArray[np.int32], count: int, finer: NDArray[np.int32], least_cells: int, workers: Workers
+) -> list[NDArray[np.float64]]:
+    cells, starts = cells_of_patches(labels, count, workers=workers)
+
+    def work(part: tuple[int, int]) -> NDArray[np.float64]:
+        return _boxes(cells, starts, *part, finer, least_cells)  # type: ignore[no-any-return]
+
+    return workers.map(work, workers.ranges(np.diff(starts)))
 
 
 @njit(cache=True, nogil=True)
-def label_patches(height, roof, step):  # type: ignore[no-untyped-def]
-    """Label roof cells (four neighbours, at most `step` centimetres apart) from 1; also return the number of labels."""
-    rows, columns = roof.shape
-    labels = np.zeros((rows, columns), dtype=np.int32)
-    stack = np.empty((rows * columns + 1, 2), dtype=np.int32)
-    count = 0
-    for r0 in range(rows):
-        for c0 in range(columns):
-            if not roof[r0, c0] or labels[r0, c0] != 0:
-                continue
-            count += 1
-            labels[r0, c0] = count
-            stack[0, 0], stack[0, 1] = r0, c0
-            size = 1
-            while size > 0:
-                size -= 1
-                r, c = stack[size, 0], stack[size, 1]
-                for side in range(4):
-                    i = r + (1 if side == 0 else (-1 if side == 1 else 0))
-                    j = c + (1 if side == 2 else (-1 if side == 3 else 0))
-                    if i < 0 or j < 0 or i >= rows or j >= columns or not roof[i, j] or labels[i, j] != 0:
-                        continue
-                    if abs(height[i, j] - height[r, c]) <= step:
-                        labels[i, j] = count
-                        stack[size, 0], stack[size, 1] = i, j
-                        size += 1
-    return labels, count
-
-
-@njit(cache=True, nogil=True)
-def _boxes(labels, count, finer, least_cells):  # type: ignore[no-untyped-def]
-    """Return the boxes of all patches but those that are also patches of `finer` labels, which had them already."""
-    rows, columns = labels.shape
-    sizes = np.zeros(count + 2, dtype=np.int64)
-    for r in range(rows):
-        for c in range(columns):
-            sizes[labels[r, c] + 1] += 1
-    sizes[1] = 0
-    starts = np.cumsum(sizes)
-    place = starts[:-1].copy()
-    members = np.empty((starts[-1], 2), dtype=np.int32)
-    for r in range(rows):
-        for c in range(columns):
-            label = labels[r, c]
-            if label > 0:
-                members[place[label], 0], members[place[label], 1] = r, c
-                place[label] += 1
-    boxes = np.empty(((_PIECES + 1) * max(count, 1), 5))
+def _boxes(members, starts, first, last, finer, least_cells):  # type: ignore[no-untyped-def]
+    """Return the boxes of some patches but those that are also patches of `finer` labels, which had them already."""
+    boxes = np.empty(((_PIECES + 1) * (last - first), 5))
     n = 0
-    for label in range(1, count + 1):
-        cells = members[starts[label] : starts[label + 1]]
+    for patch in range(first, last):
+        cells = members[starts[patch] : starts[patch + 1]]
         if len(cells) >= least_cells and not _is_patch(finer, cells):
             n = _take_apart(cells, least_cells, boxes, n)
     return boxes[:n].copy()

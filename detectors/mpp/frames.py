@@ -22,10 +22,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import shapely
 from numba import njit
+from numpy.typing import NDArray
 
 from .cells import HIGH, LOW, VOID
-from .rectangles import row_span
+from .patches import patch_sizes
+from .rectangles import corners, overlap_area, row_span
+from .workers import ALONE, Workers
 
 __all__ = ["lower_storeys"]
 
@@ -33,6 +37,8 @@ __all__ = ["lower_storeys"]
 _BORDER = 2.0
 #: Strips that a box may grow by on each side.
 _GROWTH = 6
+#: How far beyond its sides a box may look, cells.
+_REACH = 0.5 * _GROWTH + 2.0
 #: Share of a side's known cells that must lie at the base, share of a box that may lie lower, and share that must have
 #: the texture of a roof.
 _LEVEL, _LOWER, _SMOOTH = 0.6, 0.2, 0.8
@@ -40,9 +46,19 @@ _LEVEL, _LOWER, _SMOOTH = 0.6, 0.2, 0.8
 _REACHED, _INSIDE = 0.2, 0.85
 
 
-@njit(cache=True, nogil=True)
-def lower_storeys(height, state, labels, count, boxes, step):  # type: ignore[no-untyped-def]
-    """Lower the storeys of all frames among the boxes in place; return whether there was any.
+def lower_storeys(
+    height: NDArray[np.int32],
+    state: NDArray[np.uint8],
+    labels: NDArray[np.int32],
+    count: int,
+    boxes: NDArray[np.float64],
+    step: int,
+    *,
+    workers: Workers = ALONE,
+) -> None:
+    """Lower the storeys of all frames among the boxes, one box after the other, in place.
+
+    Boxes that share no cell do not know of each other, so several threads work off wave after wave of such boxes.
 
     Parameters
     ----------
@@ -56,24 +72,45 @@ def lower_storeys(height, state, labels, count, boxes, step):  # type: ignore[no
         Largest first.
     step : int
         Centimetres.
+    workers : Workers
     """
-    rows, columns = height.shape
-    sizes = np.zeros(count + 1, dtype=np.int64)
-    for r in range(rows):
-        for c in range(columns):
-            sizes[labels[r, c]] += 1
-    inside = np.zeros(count + 1, dtype=np.int64)
-    rise = np.zeros(count + 1, dtype=np.int64)
-    reached = np.zeros((count + 1, 4), dtype=np.int64)
-    storey = np.zeros(count + 1, dtype=np.bool_)
-    found = False
-    box = np.empty(5)
+    sizes = patch_sizes(labels, count, workers=workers)
+    wave = np.zeros(len(boxes), dtype=np.int64) if workers.count == 1 else _waves(boxes)
+    for turn in range(wave.max(initial=-1) + 1):
+        batch = boxes[wave == turn]
+
+        def work(part: tuple[int, int], batch: NDArray[np.float64] = batch) -> None:
+            _lower_boxes(height, state, labels, sizes, batch[slice(*part)], step)
+
+        workers.map(work, workers.ranges(batch[:, 2] * batch[:, 3], each=2))
+
+
+def _waves(boxes: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the wave of each box: the first after those of all boxes before it that it may share a cell with."""
+    grown = boxes + np.array([0.0, 0.0, 2 * _REACH, 2 * _REACH, 0.0])
+    place = corners(grown)
+    bounds = shapely.box(*place.min(axis=1).T, *place.max(axis=1).T)
+    later, before = shapely.STRtree(bounds).query(bounds)
+    order = np.argsort(later, kind="stable")
+    return _count_waves(grown, later[order], before[order])  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True)
+def _count_waves(boxes, later, before):  # type: ignore[no-untyped-def]
+    wave = np.zeros(len(boxes), dtype=np.int64)
+    for pair in range(len(later)):
+        i, j = later[pair], before[pair]
+        if j < i and wave[i] <= wave[j] and overlap_area(boxes[i], boxes[j]) > 0.0:
+            wave[i] = wave[j] + 1
+    return wave
+
+
+@njit(cache=True, nogil=True)
+def _lower_boxes(height, state, labels, sizes, boxes, step):  # type: ignore[no-untyped-def]
     for k in range(len(boxes)):
-        box[:] = boxes[k]
+        box = boxes[k].copy()
         _grow(height, state, box, step)
-        if _lower_one(height, state, labels, box, step, sizes, inside, rise, reached, storey):
-            found = True
-    return found
+        _lower_one(height, state, labels, sizes, box, step)
 
 
 @njit(cache=True, nogil=True)
@@ -110,126 +147,173 @@ def _grow(height, state, box, step):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _cells_of(box, shape):  # type: ignore[no-untyped-def]
-    """Return row, column and side of the border (4: within it, 5: at its very edge) of the cells of a box."""
+def _cells_of(box, shape, inner):  # type: ignore[no-untyped-def]
+    """Return row, column and side of the border (4: within it, 5: at its very edge) of the cells of a box.
+
+    Without `inner` those within the border are left out.
+    """
     rows, columns = shape
     cx, cy, half_a, half_b = box[0], box[1], 0.5 * box[2], 0.5 * box[3]
     cos, sin = math.cos(box[4]), math.sin(box[4])
     tall = half_a * abs(sin) + half_b * abs(cos)
-    members = np.empty((int((box[2] + 2) * (box[3] + 2) + 8), 3), dtype=np.int32)
+    core_a, core_b = half_a - _BORDER, half_b - _BORDER
+    room = (box[2] + 2) * (box[3] + 2) + 8
+    if not inner:
+        room -= max(2 * core_a - 4, 0.0) * max(2 * core_b - 4, 0.0)
+    members = np.empty((int(room), 3), dtype=np.int32)
     n = 0
     for r in range(max(int(cy - tall), 0), min(int(cy + tall) + 1, rows)):
         dy = r + 0.5 - cy
         lo, hi = row_span(dy, half_a, half_b, cos, sin)
         if not lo < hi:
             continue
-        for c in range(max(int(cx + lo + 0.5), 0), min(int(cx + hi + 0.5), columns)):
-            if n == len(members):
-                break
-            dx = c + 0.5 - cx
-            u, v = dx * cos + dy * sin, dy * cos - dx * sin
-            away_u, away_v = half_a - abs(u), half_b - abs(v)
-            side = (1 if u > 0 else 0) if away_u < away_v else (3 if v > 0 else 2)
-            away = min(away_u, away_v)
-            members[n, 0], members[n, 1] = r, c
-            members[n, 2] = 5 if away < 0.5 else (side if away < _BORDER else 4)
-            n += 1
+        first, last = max(int(cx + lo + 0.5), 0), min(int(cx + hi + 0.5), columns)
+        left, right = last, last
+        if core_a > 0 and core_b > 0:
+            lo, hi = row_span(dy, core_a, core_b, cos, sin)
+            if lo + 4.0 < hi:
+                # Cells that rounding might put on either side of the core's are looked at.
+                left = max(min(int(cx + lo + 2.0), last), first)
+                right = max(min(int(cx + hi - 1.0), last), left)
+        n = _look(members, n, box, r, first, left, inner)
+        if inner:
+            for c in range(left, min(right, left + len(members) - n)):
+                members[n, 0], members[n, 1], members[n, 2] = r, c, 4
+                n += 1
+        n = _look(members, n, box, r, right, last, inner)
     return members[:n]
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _look(members, n, box, r, first, last, inner):  # type: ignore[no-untyped-def]
+    """Append the cells of a part of a row, as `_cells_of` does; return how many there are now."""
+    cos, sin = math.cos(box[4]), math.sin(box[4])
+    dy = r + 0.5 - box[1]
+    for c in range(first, min(last, first + len(members) - n)):
+        dx = c + 0.5 - box[0]
+        u, v = dx * cos + dy * sin, dy * cos - dx * sin
+        away_u, away_v = 0.5 * box[2] - abs(u), 0.5 * box[3] - abs(v)
+        away = min(away_u, away_v)
+        if inner or away < _BORDER:
+            side = (1 if u > 0 else 0) if away_u < away_v else (3 if v > 0 else 2)
+            members[n, 0], members[n, 1] = r, c
+            members[n, 2] = 5 if away < 0.5 else (side if away < _BORDER else 4)
+            n += 1
+    return n
+
+
 @njit(cache=True, nogil=True)
-def _lower_one(height, state, labels, box, step, sizes, inside, rise, reached, storey):  # type: ignore[no-untyped-def]
-    cells = _cells_of(box, height.shape)
+def _base_of(height, state, labels, box, step, known):  # type: ignore[no-untyped-def]
+    """Return the base of a box, -1 where it has none or less than three sides lie at it; fill the known cells a side.
+
+    Most boxes are told from frames here, by their border alone.
+    """
+    cells = _cells_of(box, height.shape, False)
     border = np.empty(len(cells), dtype=np.int32)
-    known = np.zeros(4, dtype=np.int64)
     n = 0
     for i in range(len(cells)):
         r, c, side = cells[i, 0], cells[i, 1], cells[i, 2]
         if side < 4 and labels[r, c] > 0:
             border[n] = height[r, c]
             n += 1
-        if side < 4 and state[r, c] in (LOW, HIGH):
+        if side < 4 and state[r, c] != VOID:
             known[side] += 1
     if n < 8:
-        return False
-    base = np.int64(np.sort(border[:n])[n // 2])
+        return -1
+    base = np.int64(np.partition(border[:n], n // 2)[n // 2])
     level, taken = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
-    lower, higher, all_known, smooth = 0, 0, 0, 0
     for i in range(len(cells)):
         r, c, side = cells[i, 0], cells[i, 1], cells[i, 2]
-        if side == 5 or (state[r, c] != LOW and state[r, c] != HIGH):
-            continue
-        all_known += 1
-        smooth += labels[r, c] > 0
-        above = height[r, c] - base if state[r, c] == HIGH else -base
-        if above < -step:
-            lower += 1
-        elif above > step:
-            higher += 1
-            if side < 4 and labels[r, c] > 0:
+        if side < 4 and state[r, c] != VOID:
+            above = _rise(height, state, r, c, base)
+            if abs(above) <= step:
+                level[side] += 1
+            elif above > step and labels[r, c] > 0:
                 taken[side] += 1
-        elif side < 4:
-            level[side] += 1
-    if higher == 0 or lower > _LOWER * all_known or smooth < _SMOOTH * all_known:
-        return False
     sides = 0
     for side in range(4):
         if level[side] >= _LEVEL * max(level[side] + taken[side], known[side] // 2) and level[side] > 0:
             sides += 1
-    if sides < 3:
-        return False
+    return base if sides >= 3 else -1
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _rise(height, state, r, c, base):  # type: ignore[no-untyped-def]
+    """Return how high a cell lies above the base, centimetres."""
+    return height[r, c] - base if state[r, c] == HIGH else -base
+
+
+@njit(cache=True, nogil=True)
+def _lower_one(height, state, labels, sizes, box, step):  # type: ignore[no-untyped-def]
+    known = np.zeros(4, dtype=np.int64)
+    base = _base_of(height, state, labels, box, step, known)
+    if base < 0:
+        return
+    cells = _cells_of(box, height.shape, True)
+    lower, higher, all_known, smooth = 0, 0, 0, 0
+    least, most = len(sizes), 0
+    for i in range(len(cells)):
+        r, c = cells[i, 0], cells[i, 1]
+        label = labels[r, c]
+        if label > 0:
+            least, most = min(least, label), max(most, label)
+        if cells[i, 2] < 5 and state[r, c] != VOID:
+            all_known += 1
+            smooth += label > 0
+            above = _rise(height, state, r, c, base)
+            lower += above < -step
+            higher += above > step
+    if higher == 0 or lower > _LOWER * all_known or smooth < _SMOOTH * all_known:
+        return
+    inside, rise = np.zeros(most - least + 1, dtype=np.int64), np.zeros(most - least + 1, dtype=np.int64)
+    reached = np.zeros((most - least + 1, 4), dtype=np.int64)
     for i in range(len(cells)):
         r, c, side = cells[i, 0], cells[i, 1], cells[i, 2]
         label = labels[r, c]
         if label > 0:
-            inside[label] += 1
-            rise[label] += height[r, c]
+            inside[label - least] += 1
+            rise[label - least] += height[r, c]
             if side < 4:
-                reached[label, side] += 1
+                reached[label - least, side] += 1
     # Storeys are marked first: their cells are lowered to the plane of what is none.
-    any_storey = False
-    for i in range(len(cells)):
-        label = labels[cells[i, 0], cells[i, 1]]
-        if label == 0 or storey[label] or inside[label] < _INSIDE * sizes[label]:
+    storey = np.zeros(most - least + 1, dtype=np.bool_)
+    for patch in range(most - least + 1):
+        many = inside[patch]
+        if many == 0 or many < _INSIDE * sizes[least + patch] or rise[patch] <= (base + step) * many:
             continue
         contacts = 0
         for side in range(4):
-            if reached[label, side] > _REACHED * known[side]:
+            if reached[patch, side] > _REACHED * known[side]:
                 contacts += 1
-        if rise[label] > (base + step) * inside[label] and contacts <= 1:
-            storey[label] = True
-            any_storey = True
-    if any_storey:
-        _flatten(height, state, labels, cells, base, step, storey, box)
-    for i in range(len(cells)):
-        label = labels[cells[i, 0], cells[i, 1]]
-        inside[label], rise[label], storey[label] = 0, 0, False
-        reached[label, :] = 0
-    return any_storey
+        storey[patch] = contacts <= 1
+    if storey.any():
+        _flatten(height, state, labels, cells, base, step, storey, least, box)
 
 
 @njit(cache=True, nogil=True)
-def _flatten(height, state, labels, cells, base, step, storey, box):  # type: ignore[no-untyped-def]
+def _flatten(height, state, labels, cells, base, step, storey, least, box):  # type: ignore[no-untyped-def]
     """Lower storeys, and walls and furniture above the base, to the plane of the base."""
-    a = np.zeros((3, 3))
-    b = np.zeros(3)
-    x = np.empty(3)
+    n, x, y, xx, xy, yy, h, xh, yh = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(cells)):
         r, c = cells[i, 0], cells[i, 1]
-        if labels[r, c] > 0 and not storey[labels[r, c]] and abs(height[r, c] - base) <= step:
-            x[0], x[1], x[2] = 1.0, c + 0.5 - box[0], r + 0.5 - box[1]
-            for p in range(3):
-                b[p] += x[p] * (height[r, c] - base)
-                for q in range(3):
-                    a[p, q] += x[p] * x[q]
-    for p in range(3):
-        a[p, p] += 1.0
-    plane = np.linalg.solve(a, b)
+        if labels[r, c] > 0 and not storey[labels[r, c] - least] and abs(height[r, c] - base) <= step:
+            dx, dy, rise = c + 0.5 - box[0], r + 0.5 - box[1], height[r, c] - base
+            n += 1.0
+            x += dx
+            y += dy
+            xx += dx * dx
+            xy += dx * dy
+            yy += dy * dy
+            h += rise
+            xh += dx * rise
+            yh += dy * rise
+    normal = np.array([[n + 1.0, x, y], [x, xx + 1.0, xy], [y, xy, yy + 1.0]])
+    plane = np.linalg.solve(normal, np.array([h, xh, yh]))
     for i in range(len(cells)):
         r, c = cells[i, 0], cells[i, 1]
         if state[r, c] == LOW or (cells[i, 2] == 5 and state[r, c] != HIGH):
             continue
-        if labels[r, c] == 0 or (storey[labels[r, c]] and height[r, c] > base + step):
-            h = base + plane[0] + plane[1] * (c + 0.5 - box[0]) + plane[2] * (r + 0.5 - box[1])
-            height[r, c] = min(max(round(h), base - step), base + step)
+        if labels[r, c] == 0 or (storey[labels[r, c] - least] and height[r, c] > base + step):
+            level = base + plane[0] + plane[1] * (c + 0.5 - box[0]) + plane[2] * (r + 0.5 - box[1])
+            height[r, c] = min(max(round(level), base - step), base + step)
             state[r, c] = HIGH

@@ -2,16 +2,12 @@
 
 Nouns
 -----
-patch
-    Cells with the texture of a roof connected through steps no higher than a limit, and the rough cells between them
-    (walls, which have any height between two roofs, and furniture), which take the height of the roof beside them that
-    is nearer in height. Crowns belong to none.
-rim
-    The neighbours of a patch outside it, each counted as often as it touches: lower patch, higher patch, or none. Cells
-    without points (the shadow of a tower) do not count.
+patch, rim
+    See `patches`; of cells with the texture of a roof, and of the rough cells between them (walls, which have any
+    height between two roofs, and furniture), which take the height of the roof beside them that is nearer in height
+    (`rough`). Crowns belong to none.
 superstructure
     A patch whose rim is lower roof nearly all round. A house in a row is none: its front and back stand free.
-
 furniture
     A small rough place with roof nearly all round.
 
@@ -26,9 +22,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .candidates import label_patches, propose_boxes
-from .cells import HIGH, LOW, VOID
+from .candidates import propose_boxes
+from .cells import HIGH, LOW
 from .frames import lower_storeys
+from .patches import count_rims, label_patches
+from .rough import smooth_walls
 from .workers import ALONE, Workers
 
 __all__ = ["lower_superstructures"]
@@ -37,8 +35,10 @@ __all__ = ["lower_superstructures"]
 _LEDGE = 30
 #: Longest run of void cells that a tower's shadow leaves on a roof.
 _SHADOW = 12
-#: Cells that walls are eaten up by.
-_ROUNDS = 8
+#: More centimetres than any two heights differ by.
+_ANY = 1 << 30
+#: What a cell that sinks goes through.
+_DONE, _WAITING, _NEXT = np.uint8(0), np.uint8(1), np.uint8(2)
 
 
 def lower_superstructures(
@@ -73,15 +73,16 @@ def lower_superstructures(
     """
     if share > 1:
         return height, state
-    lowered, state = _lower_storeys(height, state, roof, round(100 * step), workers)
+    limit = round(100 * step)
+    lowered, state = _lower_storeys(height, state, roof, limit, workers)
+    labels, count = label_patches(lowered, roof, limit, workers=workers)
+    smooth_walls(lowered, state, labels, workers=workers)
+    if _fill_rough(lowered, state, labels, share, most, workers):
+        labels, count = label_patches(lowered, labels, limit, workers=workers)
     for turn in range(rounds):
-        labels, count = label_patches(lowered, roof, round(100 * step))
-        if turn == 0:
-            _smooth_walls(lowered, state, labels, _ROUNDS)
-        if turn == 0 and _fill_rough(lowered, state, labels, share, most):
-            labels, count = label_patches(lowered, labels > 0, round(100 * step))
-        roof = labels > 0
-        if not _lower(lowered, state, labels, count, share, round(100 * step)):
+        if turn > 0:
+            labels, count = label_patches(lowered, labels, limit, workers=workers)
+        if not _lower(lowered, state, labels, count, share, limit, workers):
             break
     return lowered, state
 
@@ -90,55 +91,50 @@ def _lower_storeys(
     height: NDArray[np.int32], state: NDArray[np.uint8], roof: NDArray[np.bool_], step: int, workers: Workers
 ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     """Return heights and states with the storeys of frames lowered."""
+    rows, columns = state.shape
     smooth, lowered, filled = height.copy(), height.copy(), state.copy()
-    labels, count = label_patches(smooth, _with_ledges(height, state, roof), step)
-    _smooth_walls(smooth, state, labels, _ROUNDS)
-    jobs = ((_with_shadows(state), 1e6), (labels > 0, 0.01 * step))
+    solid = roof.copy()
+    workers.bands(lambda first, last: _add_ledges(height, state, first, last, solid), rows)
+    labels, count = label_patches(smooth, solid, step, workers=workers)
+    smooth_walls(smooth, state, labels, workers=workers)
+    solid = state == HIGH
+    workers.bands(lambda first, last: _add_shadows(state, first, last, solid), rows)
+    workers.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
     boxes = np.concatenate(
-        workers.map(lambda job: propose_boxes(smooth, job[0], steps=(job[1],), least_cells=24), jobs)
+        [
+            propose_boxes(smooth, solid, steps=(1e6,), least_cells=24, workers=workers),
+            propose_boxes(smooth, labels, steps=(0.01 * step,), least_cells=24, workers=workers),
+        ]
     )
     boxes = boxes[np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")]
-    lower_storeys(lowered, filled, labels, count, boxes, step)
+    lower_storeys(lowered, filled, labels, count, boxes, step, workers=workers)
     return lowered, filled
 
 
 @njit(cache=True, nogil=True)
-def _with_shadows(state):  # type: ignore[no-untyped-def]
-    """Return the high cells, and the runs of void ones between two of them in a row or a column: shadows of towers."""
-    rows, columns = state.shape
-    solid = state == HIGH
-    for r in range(rows):
-        last = -_SHADOW
-        for c in range(columns):
+def _add_shadows(state, first, last, solid):  # type: ignore[no-untyped-def]
+    """Add the runs of void cells between two high ones of a row, in place: shadows of towers."""
+    for r in range(first, last):
+        high = -_SHADOW
+        for c in range(state.shape[1]):
             if state[r, c] == HIGH:
-                if 1 < c - last <= _SHADOW:
-                    solid[r, last + 1 : c] = True
-                last = c
+                if 1 < c - high <= _SHADOW:
+                    solid[r, high + 1 : c] = True
+                high = c
             elif state[r, c] == LOW:
-                last = -_SHADOW
-    for c in range(columns):
-        last = -_SHADOW
-        for r in range(rows):
-            if state[r, c] == HIGH:
-                if 1 < r - last <= _SHADOW:
-                    solid[last + 1 : r, c] = True
-                last = r
-            elif state[r, c] == LOW:
-                last = -_SHADOW
-    return solid
+                high = -_SHADOW
 
 
 @njit(cache=True, nogil=True)
-def _with_ledges(height, state, roof):  # type: ignore[no-untyped-def]
-    """Return the roof cells and the high cells that share their height with four of their eight neighbours.
+def _add_ledges(height, state, first, last, solid):  # type: ignore[no-untyped-def]
+    """Add the high cells that share their height with four of their eight neighbours, in place.
 
     A ledge around a tower is too narrow for a window of texture, and level nevertheless.
     """
     rows, columns = state.shape
-    solid = roof.copy()
-    for r in range(1, rows - 1):
+    for r in range(max(first, 1), min(last, rows - 1)):
         for c in range(1, columns - 1):
-            if roof[r, c] or state[r, c] != HIGH:
+            if solid[r, c] or state[r, c] != HIGH:
                 continue
             level = 0
             for i in range(r - 1, r + 2):
@@ -146,171 +142,115 @@ def _with_ledges(height, state, roof):  # type: ignore[no-untyped-def]
                     if state[i, j] == HIGH and abs(height[i, j] - height[r, c]) <= _LEDGE:
                         level += 1
             solid[r, c] = level > 4
-    return solid
 
 
-@njit(cache=True, nogil=True)
-def _smooth_walls(height, state, labels, rounds):  # type: ignore[no-untyped-def]
-    """Give rough high cells between labelled ones the label and height of the neighbour nearest in height, in place.
-
-    A cell is taken when five of its eight neighbours are labelled, so that walls and furniture are eaten up from their
-    corners while the straight edge of a roof beside a crown stays. Each round goes by what the one before left.
-    """
-    rows, columns = state.shape
-    free = 0
-    for r in range(1, rows - 1):
-        for c in range(1, columns - 1):
-            free += labels[r, c] == 0 and state[r, c] == HIGH
-    rough, taken = np.empty((free, 2), dtype=np.int32), np.empty((free, 4), dtype=np.int32)
-    free = 0
-    for r in range(1, rows - 1):
-        for c in range(1, columns - 1):
-            if labels[r, c] == 0 and state[r, c] == HIGH:
-                rough[free, 0], rough[free, 1] = r, c
-                free += 1
-    for _ in range(rounds):
-        left, found = 0, 0
-        for k in range(free):
-            r, c = rough[k, 0], rough[k, 1]
-            known, nearest, label, carrier = 0, np.int64(1) << 40, 0, 0
-            for i in range(r - 1, r + 2):
-                for j in range(c - 1, c + 2):
-                    if labels[i, j] > 0:
-                        known += 1
-                        gap = abs(np.int64(height[i, j]) - height[r, c])
-                        if gap < nearest:
-                            nearest, label, carrier = gap, labels[i, j], height[i, j]
-            if known >= 5:
-                taken[found, 0], taken[found, 1], taken[found, 2], taken[found, 3] = r, c, label, carrier
-                found += 1
-            else:
-                rough[left] = rough[k]
-                left += 1
-        for k in range(found):
-            r, c = taken[k, 0], taken[k, 1]
-            labels[r, c], height[r, c] = taken[k, 2], taken[k, 3]
-        free = left
-        if found == 0:
-            break
-
-
-@njit(cache=True, nogil=True)
-def _fill_rough(height, state, labels, share, most):  # type: ignore[no-untyped-def]
+def _fill_rough(
+    height: NDArray[np.int32],
+    state: NDArray[np.uint8],
+    labels: NDArray[np.int32],
+    share: float,
+    most: int,
+    workers: Workers,
+) -> bool:
     """Level rough places that roof surrounds, in place; return whether there was any."""
-    rows, columns = state.shape
-    rough, count = label_patches(height, (state == HIGH) & (labels == 0), 1 << 30)
-    size = np.zeros(count + 1, dtype=np.int64)
-    rim = np.zeros(count + 1, dtype=np.int64)
-    roof = np.zeros(count + 1, dtype=np.int64)
-    for r in range(rows):
-        for c in range(columns):
-            place = rough[r, c]
-            if place == 0:
-                continue
-            size[place] += 1
-            for side in range(4):
-                i = r + (1 if side == 0 else (-1 if side == 1 else 0))
-                j = c + (1 if side == 2 else (-1 if side == 3 else 0))
-                if i < 0 or j < 0 or i >= rows or j >= columns:
-                    rim[place] += 1
-                elif rough[i, j] == 0 and state[i, j] != VOID:
-                    rim[place] += 1
-                    roof[place] += labels[i, j] > 0
-    chosen = np.zeros((rows, columns), dtype=np.bool_)
-    found = False
-    for r in range(rows):
-        for c in range(columns):
-            place = rough[r, c]
-            if place > 0 and roof[place] > 0 and size[place] <= most and roof[place] >= share * rim[place]:
-                chosen[r, c] = True
-                found = True
-    if found:
-        _sink(height, labels, chosen, 1 << 20)
-    return found
+    places, count = label_patches(height, (state == HIGH) & (labels == 0), _ANY, workers=workers)
+    rims = count_rims(places, count, height, state, labels, fall=-_ANY, workers=workers)
+    return _sink(height, labels, places, rims.carried(share) & (rims.cells <= most), _ANY, workers)
 
 
-@njit(cache=True, nogil=True)
-def _lower(height, state, labels, count, share, step):  # type: ignore[no-untyped-def]
+def _lower(
+    height: NDArray[np.int32],
+    state: NDArray[np.uint8],
+    labels: NDArray[np.int32],
+    count: int,
+    share: float,
+    step: int,
+    workers: Workers,
+) -> bool:
     """Lower the superstructures in place; return whether there was any."""
-    rows, columns = state.shape
-    rim = np.zeros(count + 1, dtype=np.int64)
-    below = np.zeros(count + 1, dtype=np.int64)
-    for r in range(rows):
-        for c in range(columns):
-            label = labels[r, c]
-            if label == 0:
-                continue
-            for side in range(4):
-                i = r + (1 if side == 0 else (-1 if side == 1 else 0))
-                j = c + (1 if side == 2 else (-1 if side == 3 else 0))
-                if i < 0 or j < 0 or i >= rows or j >= columns:
-                    rim[label] += 1
-                elif labels[i, j] != label and state[i, j] != VOID:
-                    rim[label] += 1
-                    below[label] += labels[i, j] > 0 and height[i, j] < height[r, c]
-    chosen = np.zeros((rows, columns), dtype=np.bool_)
-    found = False
-    for r in range(rows):
-        for c in range(columns):
-            label = labels[r, c]
-            if label > 0 and below[label] > 0 and below[label] >= share * rim[label]:
-                chosen[r, c] = True
-                found = True
-    if found:
-        _sink(height, labels, chosen, -step // 2)
-    return found
+    rims = count_rims(labels, count, height, state, labels, fall=1, workers=workers)
+    return _sink(height, labels, labels, rims.carried(share), -step // 2, workers)
 
 
-@njit(cache=True, nogil=True)
-def _sink(height, labels, chosen, above):  # type: ignore[no-untyped-def]
-    """Give chosen cells the height of the roof beside them, in place, from the rim inwards.
+def _sink(
+    height: NDArray[np.int32],
+    labels: NDArray[np.int32],
+    patches: NDArray[np.int32],
+    sinking: NDArray[np.bool_],
+    above: int,
+    workers: Workers,
+) -> bool:
+    """Give the cells of some patches the height of the roof beside them, in place; return whether there was any.
 
     Roof counts that is at most `above` centimetres higher than the cell; a step of the roof below goes on under what
     stands on it.
     """
-    rows, columns = height.shape
-    queue = np.empty((np.count_nonzero(chosen), 2), dtype=np.int32)
-    waiting = chosen.copy()
-    size, done, end = 0, 0, 0
-    for r in range(rows):
-        for c in range(columns):
-            if chosen[r, c] and _beside(height, labels, chosen, waiting, r, c, above) >= 0:
-                queue[size, 0], queue[size, 1] = r, c
-                size += 1
-    for k in range(size):
-        chosen[queue[k, 0], queue[k, 1]] = False
-    while done < size:
-        # One ring at a time, so that no direction is favoured.
-        end = size
-        for k in range(done, end):
-            r, c = queue[k, 0], queue[k, 1]
-            beside = _beside(height, labels, chosen, waiting, r, c, above)
-            height[r, c] = -1 - (beside if beside >= 0 else height[r, c])
-        for k in range(done, end):
-            r, c = queue[k, 0], queue[k, 1]
-            height[r, c] = -1 - height[r, c]
-            waiting[r, c] = False
-            labels[r, c] = max(labels[r, c], 1)
-        for k in range(done, end):
-            r, c = queue[k, 0], queue[k, 1]
-            for i in range(max(r - 1, 0), min(r + 2, rows)):
-                for j in range(max(c - 1, 0), min(c + 2, columns)):
-                    if chosen[i, j]:
-                        chosen[i, j] = False
-                        queue[size, 0], queue[size, 1] = i, j
-                        size += 1
-        done = end
+    if not sinking.any():
+        return False
+    waiting = np.empty(labels.shape, dtype=np.uint8)
+    workers.bands(lambda first, last: _choose(patches, sinking, first, last, waiting), len(waiting))
+    rings = workers.bands(lambda first, last: _outer_ring(height, labels, waiting, first, last, above), len(waiting))
+    _sink_rings(height, labels, waiting, np.concatenate(rings), above)
+    return True
 
 
 @njit(cache=True, nogil=True)
-def _beside(height, labels, chosen, waiting, r, c, above):  # type: ignore[no-untyped-def]
+def _choose(patches, sinking, first, last, waiting):  # type: ignore[no-untyped-def]
+    for r in range(first, last):
+        for c in range(patches.shape[1]):
+            waiting[r, c] = _WAITING if sinking[patches[r, c]] else _DONE
+
+
+@njit(cache=True, nogil=True)
+def _outer_ring(height, labels, waiting, first, last, above):  # type: ignore[no-untyped-def]
+    """Return row and column of the waiting cells of some rows that have roof beside them."""
+    # Laid out for the worst case; only what is written takes memory.
+    ring = np.empty(((last - first) * waiting.shape[1], 2), dtype=np.int32)
+    size = 0
+    for r in range(first, last):
+        for c in range(waiting.shape[1]):
+            if waiting[r, c] != _DONE and _beside(height, labels, waiting, r, c, above) >= 0:
+                ring[size, 0], ring[size, 1] = r, c
+                size += 1
+    return ring[:size].copy()
+
+
+@njit(cache=True, nogil=True)
+def _sink_rings(height, labels, waiting, ring, above):  # type: ignore[no-untyped-def]
+    """Let waiting cells sink, in place, one ring at a time, so that no direction is favoured."""
+    rows, columns = height.shape
+    for k in range(len(ring)):
+        waiting[ring[k, 0], ring[k, 1]] = _NEXT
+    while len(ring) > 0:
+        for k in range(len(ring)):
+            r, c = ring[k, 0], ring[k, 1]
+            beside = _beside(height, labels, waiting, r, c, above)
+            if beside >= 0:
+                height[r, c] = beside
+        for k in range(len(ring)):
+            r, c = ring[k, 0], ring[k, 1]
+            waiting[r, c] = _DONE
+            labels[r, c] = max(labels[r, c], 1)
+        inner, size = np.empty((8 * len(ring), 2), dtype=np.int32), 0
+        for k in range(len(ring)):
+            for i in range(max(ring[k, 0] - 1, 0), min(ring[k, 0] + 2, rows)):
+                for j in range(max(ring[k, 1] - 1, 0), min(ring[k, 1] + 2, columns)):
+                    if waiting[i, j] == _WAITING:
+                        waiting[i, j] = _NEXT
+                        inner[size, 0], inner[size, 1] = i, j
+                        size += 1
+        ring = inner[:size]
+
+
+@njit(cache=True, nogil=True)
+def _beside(height, labels, waiting, r, c, above):  # type: ignore[no-untyped-def]
     """Mean height of the roof among a cell's eight neighbours, of the level that most of them share; -1 without one."""
     rows, columns = height.shape
     levels = np.empty(8, dtype=np.int64)
     n = 0
     for i in range(max(r - 1, 0), min(r + 2, rows)):
         for j in range(max(c - 1, 0), min(c + 2, columns)):
-            roof = labels[i, j] > 0 and not waiting[i, j] and not chosen[i, j]
+            roof = labels[i, j] > 0 and waiting[i, j] == _DONE
             if roof and 0 <= height[i, j] <= height[r, c] + above:
                 levels[n] = height[i, j]
                 n += 1

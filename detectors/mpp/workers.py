@@ -10,7 +10,11 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 __all__ = ["ALONE", "Workers", "some_workers"]
 
@@ -36,10 +40,17 @@ class Workers:
         """Return the results of all jobs, in their order."""
         return [function(job) for job in jobs] if self.pool is None else list(self.pool.map(function, jobs))
 
-    def bands(self, function: Callable[[int, int], None], rows: int) -> None:
-        """Call ``function(first, last)`` for bands of rows that make up the whole."""
-        edges = [rows * band // self.count for band in range(self.count + 1)]
-        self.map(lambda band: function(edges[band], edges[band + 1]), range(self.count))
+    def bands(self, function: Callable[[int, int], _Result], rows: int) -> list[_Result]:
+        """Return ``function(first, last)`` of bands of rows that make up the whole, none of them empty."""
+        edges = sorted({rows * band // self.count for band in range(self.count + 1)})
+        return self.map(lambda band: function(*band), pairwise(edges))
+
+    def ranges(self, sizes: NDArray[Any], *, each: int = 8) -> list[tuple[int, int]]:
+        """Return ranges of jobs of these sizes, ``(first, last)``, of about the same sum: `each` for each thread."""
+        parts = 1 if self.count == 1 else each * self.count
+        ends = np.cumsum(sizes)
+        edges = np.searchsorted(ends, ends[-1:] * np.arange(1, parts) / parts)
+        return list(pairwise(sorted({0, *edges.tolist(), len(sizes)})))
 
 
 #: The calling thread.

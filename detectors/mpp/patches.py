@@ -1,0 +1,254 @@
+"""Patches: cells of roof that hang together, and what they touch.
+
+Nouns
+-----
+patch
+    Cells (roof, or any that a mask chooses) connected through their four sides by steps no higher than a limit.
+label
+    Number of a patch, from 1, by the place of its first cell: row by row from the north, in a row from the west; 0 is
+    no patch.
+rim
+    The neighbours of a patch outside it, each counted as often as it touches. Cells without points do not count; the
+    border of the grid does.
+
+Bands of rows are labelled by themselves, each from the number of its first cell on, so that numbers of different bands
+never meet; then what touches across their borders is joined, and the numbers of what is joined are counted off in
+rising order. The smallest number of a patch is that of its first cell, so labels do not tell where bands met.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .cells import VOID
+from .workers import ALONE, Workers
+
+__all__ = ["Rims", "cells_of_patches", "count_rims", "label_patches", "patch_sizes"]
+
+_Labels = NDArray[np.int32]
+
+
+def label_patches(
+    height: NDArray[np.int32], mask: NDArray[np.bool_] | _Labels, step: int, *, workers: Workers = ALONE
+) -> tuple[_Labels, int]:
+    """Label the patches of the cells that a mask chooses; also return how many there are.
+
+    Parameters
+    ----------
+    height : ndarray of int32, shape (rows, columns)
+        Centimetres.
+    mask : ndarray of bool or int32, shape (rows, columns)
+        Not 0 where a cell belongs to a patch.
+    step : int
+        Centimetres by which neighbours in a patch differ at most.
+    workers : Workers
+    """
+    labels = np.empty(height.shape, dtype=np.int32)
+    # Laid out for the worst case, a patch for each cell; only what is written takes memory.
+    parent = np.empty(height.size + 1, dtype=np.int32)
+    numbered = workers.bands(
+        lambda first, last: _label_rows(height, mask, step, first, last, labels, parent), len(height)
+    )
+    bands = np.array(numbered, dtype=np.int64)
+    for row in bands[1:, 0]:
+        _join_rows(height, labels, step, row, parent)
+    count = _count_off(parent, bands, height.shape[1])
+    workers.bands(lambda first, last: _relabel(labels, parent, first, last), len(height))
+    return labels, count
+
+
+@njit(cache=True, nogil=True)
+def _label_rows(height, mask, step, first, last, labels, parent):  # type: ignore[no-untyped-def]
+    """Label the patches of some rows, some with several numbers that `parent` joins; return first row, last number."""
+    columns = height.shape[1]
+    number = first * columns
+    for r in range(first, last):
+        for c in range(columns):
+            if not mask[r, c]:
+                labels[r, c] = 0
+                continue
+            west, north = 0, 0
+            if c > 0 and labels[r, c - 1] > 0 and abs(height[r, c - 1] - height[r, c]) <= step:
+                west = labels[r, c - 1]
+            if r > first and labels[r - 1, c] > 0 and abs(height[r - 1, c] - height[r, c]) <= step:
+                north = labels[r - 1, c]
+            label = max(west, north)
+            if label == 0:
+                number += 1
+                label = number
+                parent[number] = number
+            elif west != north and min(west, north) > 0:
+                label = _unite(parent, west, north)
+            labels[r, c] = label
+    return first, number
+
+
+@njit(cache=True, nogil=True)
+def _unite(parent, one, other):  # type: ignore[no-untyped-def]
+    """Join two numbers; return the smallest of what now belongs together."""
+    while parent[one] != one:
+        parent[one] = parent[parent[one]]
+        one = parent[one]
+    while parent[other] != other:
+        parent[other] = parent[parent[other]]
+        other = parent[other]
+    root = min(one, other)
+    parent[max(one, other)] = root
+    return root
+
+
+@njit(cache=True, nogil=True)
+def _join_rows(height, labels, step, row, parent):  # type: ignore[no-untyped-def]
+    """Join what touches across the border above a row."""
+    for c in range(labels.shape[1]):
+        if labels[row - 1, c] > 0 and labels[row, c] > 0 and abs(height[row - 1, c] - height[row, c]) <= step:
+            _unite(parent, labels[row - 1, c], labels[row, c])
+
+
+@njit(cache=True, nogil=True)
+def _count_off(parent, bands, columns):  # type: ignore[no-untyped-def]
+    """Put labels in the place of parents; return how many there are."""
+    count = 0
+    for b in range(len(bands)):
+        for number in range(bands[b, 0] * columns + 1, bands[b, 1] + 1):
+            # A parent is smaller than its child, so it has its label already.
+            if parent[number] == number:
+                count += 1
+                parent[number] = count
+            else:
+                parent[number] = parent[parent[number]]
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _relabel(labels, parent, first, last):  # type: ignore[no-untyped-def]
+    for r in range(first, last):
+        for c in range(labels.shape[1]):
+            if labels[r, c] > 0:
+                labels[r, c] = parent[labels[r, c]]
+
+
+def patch_sizes(labels: _Labels, count: int, *, workers: Workers = ALONE) -> NDArray[np.int64]:
+    """Return how many cells have each label, shape (count + 1,), 0 for label 0."""
+    tallies = workers.bands(lambda first, last: _tally(labels, count, first, last), len(labels))
+    return np.asarray(np.sum(tallies, axis=0))
+
+
+def cells_of_patches(
+    labels: _Labels, count: int, *, workers: Workers = ALONE
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Return row and column of all cells of patches, patch by patch, and where each patch begins, shape (count + 1,).
+
+    The cells of the patch with label k are those from ``starts[k - 1]`` to ``starts[k]``, in the order of the rows.
+    """
+    tallies = workers.bands(lambda first, last: (first, last, _tally(labels, count, first, last)), len(labels))
+    ends = np.cumsum(np.sum([tally for _, _, tally in tallies], axis=0))
+    places = np.cumsum([np.concatenate([[0], ends[:-1]]), *(tally for _, _, tally in tallies)], axis=0)
+    cells = np.empty((ends[-1], 2), dtype=np.int32)
+    jobs = [(first, last, place) for (first, last, _), place in zip(tallies, places, strict=False)]
+    workers.map(lambda job: _sort_cells(labels, *job, cells), jobs)
+    return cells, ends
+
+
+@njit(cache=True, nogil=True)
+def _tally(labels, count, first, last):  # type: ignore[no-untyped-def]
+    """Return how many cells of some rows have each label; none are counted for 0."""
+    tally = np.zeros(count + 1, dtype=np.int64)
+    for r in range(first, last):
+        for c in range(labels.shape[1]):
+            if labels[r, c] > 0:
+                tally[labels[r, c]] += 1
+    return tally
+
+
+@njit(cache=True, nogil=True)
+def _sort_cells(labels, first, last, place, cells):  # type: ignore[no-untyped-def]
+    """Write the cells of some rows to the places of their labels, which are moved on."""
+    for r in range(first, last):
+        for c in range(labels.shape[1]):
+            label = labels[r, c]
+            if label > 0:
+                cells[place[label], 0], cells[place[label], 1] = r, c
+                place[label] += 1
+
+
+@dataclass(frozen=True, eq=False)
+class Rims:
+    """How large patches are and what they touch; all of shape (count + 1,), entry 0 is that of no patch.
+
+    Attributes
+    ----------
+    cells : ndarray of int64
+    length : ndarray of int64
+        Of the rim.
+    roof : ndarray of int64
+        How much of the rim is roof that lies low enough.
+    """
+
+    cells: NDArray[np.int64]
+    length: NDArray[np.int64]
+    roof: NDArray[np.int64]
+
+    def carried(self, share: float) -> NDArray[np.bool_]:
+        """Return which patches have such roof on at least a share of their rim."""
+        return np.asarray((self.roof > 0) & (self.roof >= share * self.length))
+
+
+def count_rims(
+    patches: _Labels,
+    count: int,
+    height: NDArray[np.int32],
+    state: NDArray[np.uint8],
+    roof: _Labels,
+    *,
+    fall: int,
+    workers: Workers = ALONE,
+) -> Rims:
+    """Go round all patches.
+
+    Parameters
+    ----------
+    patches : ndarray of int32, shape (rows, columns)
+        Labels from 1 to `count`.
+    count : int
+    height : ndarray of int32, shape (rows, columns)
+        Centimetres.
+    state : ndarray of uint8, shape (rows, columns)
+        See `cells`.
+    roof : ndarray of int32, shape (rows, columns)
+        More than 0 where a neighbour is roof.
+    fall : int
+        Centimetres that roof must lie below the cell that touches it, at least, to count.
+    workers : Workers
+    """
+
+    def work(first: int, last: int) -> NDArray[np.int64]:
+        return _go_round(patches, count, height, state, roof, fall, first, last)  # type: ignore[no-any-return]
+
+    return Rims(*np.sum(workers.bands(work, len(patches)), axis=0))
+
+
+@njit(cache=True, nogil=True)
+def _go_round(patches, count, height, state, roof, fall, first, last):  # type: ignore[no-untyped-def]
+    """Return cells, length of the rim and roof on it, shape (3, count + 1), of the cells of some rows."""
+    rows, columns = patches.shape
+    found = np.zeros((3, count + 1), dtype=np.int64)
+    for r in range(first, last):
+        for c in range(columns):
+            label = patches[r, c]
+            if label == 0:
+                continue
+            found[0, label] += 1
+            for side in range(4):
+                i = r + (1 if side == 0 else (-1 if side == 1 else 0))
+                j = c + (1 if side == 2 else (-1 if side == 3 else 0))
+                if i < 0 or j < 0 or i >= rows or j >= columns:
+                    found[1, label] += 1
+                elif patches[i, j] != label and state[i, j] != VOID:
+                    found[1, label] += 1
+                    found[2, label] += roof[i, j] > 0 and height[r, c] - height[i, j] >= fall
+    return found

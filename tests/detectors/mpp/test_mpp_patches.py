@@ -1,0 +1,161 @@
+"""Patches, their rims and what is eaten up and lowered are those of the slow oracles, for any number of threads."""
+
+import naive_mpp
+import naive_patches as naive
+import numpy as np
+import pytest
+import shapely
+
+from roofbench.detectors.mpp.candidates import propose_boxes
+from roofbench.detectors.mpp.cells import HIGH, LOW, VOID
+from roofbench.detectors.mpp.frames import _REACH, _cells_of, _waves
+from roofbench.detectors.mpp.patches import cells_of_patches, count_rims, label_patches, patch_sizes
+from roofbench.detectors.mpp.rectangles import corners
+from roofbench.detectors.mpp.rough import smooth_walls
+from roofbench.detectors.mpp.superstructures import _sink, lower_superstructures
+from roofbench.detectors.mpp.workers import some_workers
+
+SHAPES = [(1, 1), (1, 9), (2, 30), (40, 1), (33, 47)]
+
+
+@pytest.fixture(params=[1, 2, 3, 7])
+def workers(request):
+    with some_workers(request.param) as threads:
+        yield threads
+
+
+def terraces(shape, seed=0):
+    """Random heights on few levels, states, and a mask of roof that winds through them."""
+    rng = np.random.default_rng(seed)
+    height = (rng.integers(0, 4, shape) * 120 + rng.integers(0, 20, shape)).astype(np.int32)
+    state = rng.choice(np.array([VOID, LOW, HIGH]), shape, p=[0.1, 0.15, 0.75])
+    return height, state, (state == HIGH) & (rng.random(shape) < 0.8)
+
+
+def town(seed=0, size=220):
+    """Houses, towers on podiums and rough crowns: heights, states and roof texture."""
+    rng = np.random.default_rng(seed)
+    height, state = np.zeros((size, size), np.int32), np.full((size, size), LOW)
+    roof = np.zeros((size, size), bool)
+    for _ in range(60):
+        top, left, tall, wide = rng.integers(2, size - 50, 2).tolist() + rng.integers(8, 45, 2).tolist()
+        low = int(rng.integers(300, 1500))
+        state[top : top + tall, left : left + wide] = HIGH
+        height[top : top + tall, left : left + wide] = low
+        roof[top : top + tall, left : left + wide] = True
+        if min(tall, wide) > 14:
+            inner = np.s_[top + 4 : top + tall - 4, left + 4 : left + wide - 5]
+            height[inner] = low + int(rng.integers(150, 3000))
+            rim = np.s_[top + 4, left + 4 : left + wide - 5]
+            height[rim], roof[rim] = low + rng.integers(0, 2000, height[rim].shape), False
+            state[top + tall - 6 : top + tall - 4, left + 6 : left + wide - 8] = VOID
+    rough = rng.random((size, size)) < 0.03
+    height[rough & (state == HIGH)] += rng.integers(50, 400, np.count_nonzero(rough & (state == HIGH))).astype(np.int32)
+    roof &= ~rough & (state == HIGH)
+    height[state != HIGH] = 0
+    return height, state, roof
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=str)
+@pytest.mark.parametrize("step", [0, 25, 130, 1 << 30])
+def test_patches_are_numbered_by_their_first_cells(shape, step, workers):
+    height, _, mask = terraces(shape)
+    expected, count = naive.label_patches(height, mask, step)
+    for chosen in (mask, 5 * mask.astype(np.int32)):
+        labels, found = label_patches(height, chosen, step, workers=workers)
+        np.testing.assert_array_equal(labels, expected)
+        assert found == count
+
+
+def test_a_spiral_that_meets_every_band_again_and_again_is_one_patch(workers):
+    mask = np.zeros((41, 41), bool)
+    for ring in range(0, 20, 2):
+        mask[ring, ring : 41 - ring] = mask[40 - ring, ring : 41 - ring] = True
+        mask[ring : 41 - ring, 40 - ring] = mask[ring + 2 : 41 - ring, ring] = True
+        mask[ring + 2, ring : ring + 2] = True
+    labels, count = label_patches(np.zeros(mask.shape, np.int32), mask, 0, workers=workers)
+    assert count == 1
+    np.testing.assert_array_equal(labels, mask)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=str)
+def test_cells_and_rims_of_patches_are_those_of_the_oracle(shape, workers):
+    height, state, mask = terraces(shape, 1)
+    labels, count = naive.label_patches(height, mask, 25)
+    cells, starts = cells_of_patches(labels, count, workers=workers)
+    for k in range(count):
+        np.testing.assert_array_equal(cells[starts[k] : starts[k + 1]], np.argwhere(labels == k + 1))
+    np.testing.assert_array_equal(patch_sizes(labels, count, workers=workers)[1:], np.diff(starts))
+    roof = np.where(height < 300, labels, 0).astype(np.int32)
+    for fall in (1, -(1 << 30)):
+        found = count_rims(labels, count, height, state, roof, fall=fall, workers=workers)
+        names = np.arange(count + 1)
+        for values, expected in zip(
+            (found.cells, found.length, found.roof), naive.rims(labels, height, state, roof, fall), strict=True
+        ):
+            np.testing.assert_array_equal(values, [expected[name] for name in names])
+
+
+def test_walls_are_eaten_up_round_by_round(workers):
+    height, state, roof = town(2, 60)
+    roof &= np.random.default_rng(3).random(roof.shape) < 0.75
+    labels, _ = naive.label_patches(height, roof, 100)
+    expected = naive.smooth_walls(height, state, labels, HIGH)
+    smooth_walls(height, state, labels, workers=workers)
+    np.testing.assert_array_equal(height, expected[0])
+    np.testing.assert_array_equal(labels, expected[1])
+
+
+@pytest.mark.parametrize("above", [-50, 1 << 30])
+def test_cells_sink_ring_by_ring(above, workers):
+    height, _, roof = town(4, 60)
+    labels, count = naive.label_patches(height, roof, 100)
+    sinking = np.random.default_rng(5).random(count + 1) < 0.3
+    sinking[0] = False
+    expected = naive.sink(height, labels, sinking[labels], above)
+    assert (expected != height).any()
+    assert _sink(height, labels, labels.copy(), sinking, above, workers)
+    np.testing.assert_array_equal(height, expected)
+    assert not _sink(height, labels, labels.copy(), np.zeros_like(sinking), above, workers)
+
+
+def test_boxes_and_superstructures_do_not_depend_on_the_number_of_threads(workers):
+    height, state, roof = town()
+    boxes = propose_boxes(height, roof, steps=(0.4, 1.0, 1000.0), least_cells=20)
+    assert len(boxes) > 60
+    np.testing.assert_array_equal(
+        propose_boxes(height, roof, steps=(0.4, 1.0, 1000.0), least_cells=20, workers=workers), boxes
+    )
+    alone = lower_superstructures(height, state, roof, step=1.0, share=0.65, most=40)
+    assert (alone[0] < height).sum() > 1000
+    assert (alone[1] != state).any()
+    found = lower_superstructures(height, state, roof, step=1.0, share=0.65, most=40, workers=workers)
+    np.testing.assert_array_equal(found[0], alone[0])
+    np.testing.assert_array_equal(found[1], alone[1])
+
+
+def test_boxes_that_share_cells_are_worked_off_in_their_order():
+    rng = np.random.default_rng(6)
+    boxes = np.column_stack([rng.uniform(0, 150, (80, 2)), rng.uniform(3, 25, (80, 2)), rng.uniform(0, np.pi, 80)])
+    grown = shapely.polygons(corners(boxes + 2 * _REACH * np.array([0, 0, 1, 1, 0])))
+    expected = []
+    for k in range(80):
+        met = [expected[j] for j in range(k) if grown[j].intersection(grown[k]).area > 0]
+        expected.append(max(met, default=-1) + 1)
+    assert max(expected) > 3
+    np.testing.assert_array_equal(_waves(boxes), expected)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2, np.pi / 2])
+def test_the_border_of_a_box_is_found_without_its_inside(angle):
+    for rectangle in ([30.2, 25.7, 21.0, 13.0, angle], [3.0, 50.0, 40.0, 9.0, angle], [20.1, 20.3, 3.0, 6.0, angle]):
+        box, shape = np.array(rectangle), (60, 55)
+        whole, border = _cells_of(box, shape, True), _cells_of(box, shape, False)
+        mask = np.zeros(shape, bool)
+        mask[whole[:, 0], whole[:, 1]] = True
+        np.testing.assert_array_equal(mask, naive_mpp.cells_inside(box, *shape))
+        u, v = naive_mpp.frame(box, *shape)
+        away = np.minimum(box[2] / 2 - abs(u), box[3] / 2 - abs(v))[whole[:, 0], whole[:, 1]]
+        np.testing.assert_array_equal(whole[:, 2] == 5, away < 0.5)
+        np.testing.assert_array_equal(whole[:, 2] == 4, away >= 2.0)
+        np.testing.assert_array_equal(border, whole[whole[:, 2] != 4])
