@@ -78,7 +78,7 @@ class Place:
 
 
 def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int, int], None] | None) -> PointCloud:
-    """Return the points of all files in the place, without noise."""
+    """Return the points of all files in the place, without noise and repeats."""
     cloud = read_points([header.path for header in clouds], window=place.extent, progress=progress)
     names = some([header.path for header in clouds])
     if len(cloud) == 0:
@@ -100,6 +100,10 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
             place.log.note(f"{np.count_nonzero(noise)} points of the classes noise (7 and 18) were left out")
             if len(cloud) == 0:
                 raise InputError(f"{names} holds no points but noise (classes 7 and 18)")
+    repeats = cloud.repeats()
+    if repeats.any():
+        cloud = cloud.take(~repeats)
+        place.log.note(f"{np.count_nonzero(repeats)} points that were there twice were left out")
     return cloud
 
 

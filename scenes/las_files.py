@@ -277,6 +277,8 @@ def _opened(file: Path) -> Iterator[Any]:
         raise
     except (LaspyException, LazrsError, OSError, RuntimeError, ValueError, EOFError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
+        if "not supported" in reason:
+            raise InputError(f"{file} cannot be read ({reason}): write it anew, for instance with laszip") from error
         raise InputError(f"{file} is truncated or broken ({reason}): copy or download it again") from error
 
 

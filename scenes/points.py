@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 
 __all__ = ["PointCloud"]
 
+#: Up to so many points are all looked at for repeats.
+_FEW = 10_000
+
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
@@ -53,6 +56,40 @@ class PointCloud:
             columns[field.name] = None if column is None else column[index]
         return PointCloud(**columns)
 
+    def repeats(self) -> NDArray[np.bool_]:
+        """Return which points equal an earlier one in everything, shape (n,): tiles that overlap hold some twice.
+
+        One point in 64 is looked at first, chosen by its coordinates so that all its copies are: points without any
+        copy among those need no sorting.
+        """
+        repeated = np.zeros(len(self), dtype=np.bool_)
+        code = _codes(self.x, self.y, self.z)
+        sample = np.sort(code[code % np.uint64(64) == 0])
+        if len(self) > _FEW and not (sample[1:] == sample[:-1]).any():
+            return repeated
+        order = np.argsort(code, kind="stable")
+        same = code[order[1:]] == code[order[:-1]]
+        later, earlier = order[1:][same], order[:-1][same]
+        equal = np.ones(len(later), dtype=np.bool_)
+        for field in dataclasses.fields(self):
+            column = getattr(self, field.name)
+            if column is not None:
+                agree = column[later] == column[earlier]
+                equal &= agree if agree.ndim == 1 else agree.all(axis=1)
+        repeated[later[equal]] = True
+        return repeated
+
     def unclassified(self) -> PointCloud:
         """Return the same points without classification: what a detector may see."""
         return dataclasses.replace(self, classification=None)
+
+
+def _codes(*coordinates: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """Return a number per point that equal points share and others hardly ever."""
+    code = np.zeros(len(coordinates[0]), dtype=np.uint64)
+    for values in coordinates:
+        code ^= np.ascontiguousarray(values, dtype=np.float64).view(np.uint64)
+        # Multiply and fold (Fibonacci hashing): the low bits of a float are mostly zero.
+        code *= np.uint64(0x9E3779B97F4A7C15)
+        code ^= code >> np.uint64(29)
+    return code

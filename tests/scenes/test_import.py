@@ -329,6 +329,16 @@ def test_points_where_no_land_is_are_left_out(files, bring, refused):
     assert "space.laz holds no heights of land" in refused("space.laz")
 
 
+def test_points_that_overlapping_tiles_hold_twice_are_taken_once(files, bring):
+    cloud = small_scenes.cloud()
+    write_points(cloud, files / "west.laz", crs=CRS)
+    write_points(cloud.take(slice(5, 40)), files / "east.laz", crs=CRS)
+    code, _, told = bring("west.laz", "east.laz")
+    assert code == 0, told
+    assert "35 points that were there twice were left out" in told
+    assert len(rb.open_scene(files / "out").points) == len(cloud)
+
+
 def test_points_without_crs_take_the_one_named_and_say_so(files, bring):
     write_points(small_scenes.cloud(), files / "bare.laz")
     code, _, err = bring("bare.laz", "--crs", CRS)
