@@ -9,8 +9,8 @@ border
 base
     The median height of the roof in the border.
 storey
-    A patch (`superstructures`) inside the box whose mean height lies more than a step above the base and that reaches
-    the border on one side at most: a tower on its podium, a storey set back from the front. A house in a row reaches
+    A patch (`superstructures`) inside the box whose mean height lies more than a step above the base, that stands on
+    roof of that level rather than of another, and that reaches the border on one side at most: a tower on its podium, a storey set back from the front. A house in a row reaches
     two opposite sides, a house with a low annexe three: both stay.
 
 A box is a frame when at least three sides of its border lie at the base and little in it is lower. Its storeys are
@@ -49,6 +49,7 @@ _REACHED, _INSIDE = 0.2, 0.85
 def lower_storeys(
     height: NDArray[np.int32],
     state: NDArray[np.uint8],
+    roofs: NDArray[np.int32],
     labels: NDArray[np.int32],
     count: int,
     boxes: NDArray[np.float64],
@@ -65,6 +66,8 @@ def lower_storeys(
     height : ndarray of int32, shape (rows, columns)
         Centimetres.
     state : ndarray of uint8, shape (rows, columns)
+    roofs : ndarray of int32, shape (rows, columns)
+        Centimetres before anything is lowered, walls at the height of the roof beside them.
     labels : ndarray of int32, shape (rows, columns)
         Patches from 1 to `count`, 0 elsewhere.
     count : int
@@ -80,7 +83,7 @@ def lower_storeys(
         batch = boxes[wave == turn]
 
         def work(part: tuple[int, int], batch: NDArray[np.float64] = batch) -> None:
-            _lower_boxes(height, state, labels, sizes, batch[slice(*part)], step)
+            _lower_boxes(height, state, roofs, labels, sizes, batch[slice(*part)], step)
 
         workers.map(work, workers.ranges(batch[:, 2] * batch[:, 3], each=2))
 
@@ -106,11 +109,11 @@ def _count_waves(boxes, later, before):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _lower_boxes(height, state, labels, sizes, boxes, step):  # type: ignore[no-untyped-def]
+def _lower_boxes(height, state, roofs, labels, sizes, boxes, step):  # type: ignore[no-untyped-def]
     for k in range(len(boxes)):
         box = boxes[k].copy()
         _grow(height, state, box, step)
-        _lower_one(height, state, labels, sizes, box, step)
+        _lower_one(height, state, roofs, labels, sizes, box, step)
 
 
 @njit(cache=True, nogil=True)
@@ -244,7 +247,7 @@ def _rise(height, state, r, c, base):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _lower_one(height, state, labels, sizes, box, step):  # type: ignore[no-untyped-def]
+def _lower_one(height, state, roofs, labels, sizes, box, step):  # type: ignore[no-untyped-def]
     known = np.zeros(4, dtype=np.int64)
     base = _base_of(height, state, labels, box, step, known)
     if base < 0:
@@ -287,7 +290,34 @@ def _lower_one(height, state, labels, sizes, box, step):  # type: ignore[no-unty
                 contacts += 1
         storey[patch] = contacts <= 1
     if storey.any():
+        _keep_carried(roofs, labels, cells, base, step, storey, least)
+    if storey.any():
         _flatten(height, state, labels, cells, base, step, storey, least, box)
+
+
+@njit(cache=True, nogil=True)
+def _keep_carried(roofs, labels, cells, base, step, storey, least):  # type: ignore[no-untyped-def]
+    """Unmark storeys that stand on a roof of another level than the base, in place.
+
+    The penthouse of a tower beside the box may lie in it as well, but is carried by its tower.
+    """
+    rows, columns = roofs.shape
+    balance = np.zeros(len(storey), dtype=np.int64)
+    for i in range(len(cells)):
+        r, c = cells[i, 0], cells[i, 1]
+        patch = labels[r, c] - least
+        if patch < 0 or not storey[patch]:
+            continue
+        for side in range(4):
+            j = r + (1 if side == 0 else (-1 if side == 1 else 0))
+            k = c + (1 if side == 2 else (-1 if side == 3 else 0))
+            if not (0 <= j < rows and 0 <= k < columns) or labels[j, k] == 0 or roofs[j, k] >= roofs[r, c]:
+                continue
+            other = labels[j, k] - least
+            if not (0 <= other < len(storey) and storey[other]):
+                balance[patch] += 1 if abs(roofs[j, k] - base) <= step else -1
+    for patch in range(len(storey)):
+        storey[patch] = storey[patch] and balance[patch] >= 0
 
 
 @njit(cache=True, nogil=True)

@@ -18,6 +18,11 @@ __all__ = ["polish"]
 
 #: Least gain of energy that counts, so that rounding cannot make the search run in circles.
 _GAIN = 1e-6
+#: Share of a joined rectangle that its two parts fill, share of their energy that it has by itself before it descends,
+#: and share of a third building that lies in it and goes with them.
+_FILLED, _HOPEFUL, _INSIDE = 0.7, 0.8, 0.7
+#: Square metres: a house in a row is not larger than the first, and does not stand against one larger than the second.
+_HOUSE, _HALL = 200.0, 500.0
 #: Positions of a wall that a split tries along one axis, at most.
 _WALLS = 32
 
@@ -253,6 +258,83 @@ def _remove(rectangles, own, count, j):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def _joined(first, second, axis, joined):  # type: ignore[no-untyped-def]
+    """Fill the rectangle at the angle of the first that reaches over both along an axis, and is as wide as both are.
+
+    The edges across the axis are means of those of the two, weighted with their lengths: where parts of one roof are a
+    cell out of line, their hull would take in a row of cells that neither wanted.
+    """
+    _hull(first, second, joined)
+    cos, sin = math.cos(first[4]), math.sin(first[4])
+    dx, dy = second[0] - first[0], second[1] - first[1]
+    across = dx * cos + dy * sin if axis == 1 else dy * cos - dx * sin
+    turn = second[4] - first[4]
+    cos_t, sin_t = abs(math.cos(turn)), abs(math.sin(turn))
+    along_u, along_v = second[2] * cos_t + second[3] * sin_t, second[2] * sin_t + second[3] * cos_t
+    length, width = (along_u, along_v) if axis == 0 else (along_v, along_u)
+    share = length / (length + first[2 + axis])
+    low = (1.0 - share) * -0.5 * first[3 - axis] + share * (across - 0.5 * width)
+    high = (1.0 - share) * 0.5 * first[3 - axis] + share * (across + 0.5 * width)
+    dx, dy = joined[0] - first[0], joined[1] - first[1]
+    u, v = dx * cos + dy * sin, dy * cos - dx * sin
+    middle = 0.5 * (low + high)
+    u, v = (u, middle) if axis == 0 else (middle, v)
+    joined[0], joined[1] = first[0] + u * cos - v * sin, first[1] + u * sin + v * cos
+    joined[3 - axis] = high - low
+
+
+@njit(cache=True, nogil=True)
+def _absorb(small, large, model, window, rectangles, own, fresh, count, fixed, i, spare):  # type: ignore[no-untyped-def]
+    """Let building i take in a smaller neighbour, and all that lies mostly in both, where that lowers the energy.
+
+    What is taken in is removed, the new rectangle and those around it descend, and the result is kept if it is better
+    than the state before. Returns the gain and the number of buildings.
+    """
+    trial, trial_own, trial_fresh = spare
+    joined = np.empty(5)
+    size = rectangles[i, 2] * rectangles[i, 3]
+    for j in range(count):
+        other = rectangles[j, 2] * rectangles[j, 3]
+        if j == i or other > size or not (other * model.cell**2 > _HOUSE or size * model.cell**2 > _HALL):
+            continue
+        dx, dy = rectangles[j, 0] - rectangles[i, 0], rectangles[j, 1] - rectangles[i, 1]
+        far = 0.5 * (math.hypot(rectangles[i, 2], rectangles[i, 3]) + math.hypot(rectangles[j, 2], rectangles[j, 3]))
+        if dx * dx + dy * dy > (far + 2.0) ** 2:
+            continue
+        for axis in range(2):
+            _joined(rectangles[i], rectangles[j], axis, joined)
+            if size + other < _FILLED * joined[2] * joined[3] or not _allowed(joined, window, model):
+                continue
+            alone = own_energy(small, large, joined, model)
+            if alone > _HOPEFUL * (own[i] + own[j]):
+                continue
+            trial[:count], trial_own[:count], trial_fresh[:count] = rectangles[:count], own[:count], fresh[:count]
+            many, gain = count, 0.0
+            # From the last to the first, so that numbers still to come stay what they are.
+            for k in range(count - 1, -1, -1):
+                inside = k == i or k == j
+                if not inside:
+                    shared = overlaps(rectangles[k : k + 1], 1, joined, -1, -1)
+                    inside = shared > _INSIDE * rectangles[k, 2] * rectangles[k, 3]
+                if inside:
+                    gain += trial_own[k] + model.overlap * _shared(trial, many, fixed, trial[k], k, -1)
+                    many -= 1
+                    trial[k], trial_own[k], trial_fresh[k] = trial[many], trial_own[many], trial_fresh[many]
+            gain -= alone + model.overlap * _shared(trial, many, fixed, joined, -1, -1)
+            trial[many], trial_own[many], trial_fresh[many] = joined, alone, True
+            many += 1
+            gain += _descend(small, large, model, window, trial, trial_own, many, fixed, many - 1)
+            for k in range(many - 1):
+                if overlaps(trial[k : k + 1], 1, trial[many - 1], -1, -1) > 0.0:
+                    gain += _descend(small, large, model, window, trial, trial_own, many, fixed, k)
+                    trial_fresh[k] = True
+            if gain > _GAIN:
+                rectangles[:many], own[:many], fresh[:many] = trial[:many], trial_own[:many], trial_fresh[:many]
+                return gain, many
+    return 0.0, count
+
+
+@njit(cache=True, nogil=True)
 def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps):  # type: ignore[no-untyped-def]
     """Lower the energy of a state until a sweep changes nothing or `sweeps` are done.
 
@@ -282,6 +364,7 @@ def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps): 
     for j in range(len(boxes)):
         if _allowed(boxes[j], window, model):
             alones[j] = energy_below(small, large, boxes[j], model, -_GAIN)
+    spare = np.empty_like(rectangles), np.empty_like(own), np.empty_like(fresh)
     gained = 0.0
     for sweep in range(sweeps):
         before = gained
@@ -334,5 +417,14 @@ def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps): 
                             fresh[j] = fresh[j] or sweep > 0
             i += 1
         if gained - before <= _GAIN and not fresh[:count].any():
-            break
+            i = 0
+            while i < count:
+                more, left = _absorb(
+                    small, large, model, window, rectangles, own, fresh, count, fixed, i, spare
+                )
+                gained += more
+                i += left == count and more == 0.0
+                count = left
+            if not fresh[:count].any():
+                break
     return rectangles[:count].copy(), gained

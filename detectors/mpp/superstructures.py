@@ -107,7 +107,7 @@ def _lower_storeys(
         ]
     )
     boxes = boxes[np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")]
-    lower_storeys(lowered, filled, labels, count, boxes, step, workers=workers)
+    lower_storeys(lowered, filled, smooth, labels, count, boxes, step, workers=workers)
     return lowered, filled
 
 
