@@ -80,7 +80,13 @@ class MPP(Detector):
         "rectangles", choices=("rectangles", "blocks"), doc="one rectangle a house or wing, or one polygon a block"
     )
     roofs: str = parameter("all", choices=("all", "flat"), doc="plane, gable and hip roofs besides flat ones, or not")
-    roof_step: float = parameter(0.5, unit="m", minimum=0.1, doc="step between neighbouring cells that parts two roofs")
+    roof_step: float = parameter(
+        0.5,
+        unit="m",
+        minimum=0.1,
+        doc="step between neighbouring cells that parts two roofs",
+        swept=(0.3, 0.5, 1.0),
+    )
     carried_share: float = parameter(
         0.65,
         minimum=0.5,

@@ -10,8 +10,9 @@ base
     The median height of the roof in the border.
 storey
     A patch (`superstructures`) inside the box whose mean height lies more than a step above the base, that stands on
-    roof of that level rather than of another, and that reaches the border on one side at most: a tower on its podium, a storey set back from the front. A house in a row reaches
-    two opposite sides, a house with a low annexe three: both stay.
+    roof of that level rather than of another, and that reaches the border on one side at most: a tower on its podium,
+    a storey set back from the front. A house in a row reaches two opposite sides, a house with a low annexe three:
+    both stay.
 
 A box is a frame when at least three sides of its border lie at the base and little in it is lower. Its storeys are
 lowered to the plane of its base, as other superstructures are: one building has one rectangle.

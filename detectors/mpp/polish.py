@@ -312,7 +312,7 @@ def _absorb(small, large, model, window, rectangles, own, fresh, count, fixed, i
             many, gain = count, 0.0
             # From the last to the first, so that numbers still to come stay what they are.
             for k in range(count - 1, -1, -1):
-                inside = k == i or k == j
+                inside = k in (i, j)
                 if not inside:
                     shared = overlaps(rectangles[k : k + 1], 1, joined, -1, -1)
                     inside = shared > _INSIDE * rectangles[k, 2] * rectangles[k, 3]
@@ -419,9 +419,7 @@ def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps): 
         if gained - before <= _GAIN and not fresh[:count].any():
             i = 0
             while i < count:
-                more, left = _absorb(
-                    small, large, model, window, rectangles, own, fresh, count, fixed, i, spare
-                )
+                more, left = _absorb(small, large, model, window, rectangles, own, fresh, count, fixed, i, spare)
                 gained += more
                 i += left == count and more == 0.0
                 count = left

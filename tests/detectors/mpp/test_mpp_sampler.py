@@ -237,3 +237,32 @@ def test_polish_never_raises_the_energy_and_says_by_how_much_it_fell():
         )
         assert after <= before + 1e-9
         assert before - after == pytest.approx(gained, abs=1e-6)
+
+
+def hall():
+    """A roof of 30 m x 24 m with a row of sheds, cells of a metre, and their tables."""
+    height = np.zeros((60, 60), np.int32)
+    height[10:34, 10:40] = 900
+    height[36:42, 10:40] = 400
+    return make_tables(height, height > 0, np.where(height > 0, 3000, -5000).astype(np.int16))
+
+
+def test_a_hall_takes_in_its_pieces_and_says_by_how_much_the_energy_fell():
+    tables, large = hall(), model(cell=1.0, weight=1.0, overlap=20.0, price=20.0, largest_side=60.0)
+    rng = np.random.default_rng(5)
+    fixed = np.array([[42.0, 20.0, 6.0, 10.0, 0.1]])
+    joined = 0
+    for _ in range(10):
+        n = 12
+        start = np.column_stack(
+            [rng.uniform(10, 40, n), rng.uniform(10, 42, n), rng.uniform(3, 25, (n, 2)), rng.uniform(-0.1, 0.1, n)]
+        )
+        end, gained = polish(
+            tables.small, tables.large, large, np.array((0.0, 0.0, 60.0, 60.0)), start, fixed, NONE, 50, 6
+        )
+        before, after = (
+            configuration_energy(tables.small, tables.large, state, len(state), fixed, large) for state in (start, end)
+        )
+        assert before - after == pytest.approx(gained, abs=1e-6)
+        joined += (end[:, 2] * end[:, 3] > 600).any()
+    assert joined > 0

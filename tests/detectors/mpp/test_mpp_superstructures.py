@@ -53,6 +53,16 @@ def test_the_shadow_of_a_tower_on_its_podium_is_podium():
     np.testing.assert_allclose(height[10:40, 15:55], 1200, atol=5)
 
 
+def test_a_penthouse_at_the_end_of_its_wing_sinks_to_the_wing_and_not_to_the_lower_one_beside():
+    world = land()
+    build(world, 4, 25, 30, 20, 12.0)
+    build(world, 34, 5, 16, 40, 42.0)
+    build(world, 37, 28, 10, 14, 46.0)
+    height, _ = lowered(world)
+    np.testing.assert_allclose(height[34:50, 5:45], 4200, atol=5)
+    np.testing.assert_allclose(height[4:34, 25:45], 1200, atol=5)
+
+
 def test_houses_of_a_row_keep_their_heights():
     world = land()
     for k, metres in enumerate((8.0, 11.0, 8.0, 12.0, 9.5)):
