@@ -46,3 +46,45 @@ def log_normal_sum(residual, n, least_tau):
     """Gaussian log-likelihood with profiled spread, term by term."""
     tau = max(math.sqrt(residual / n), least_tau)
     return n * (-math.log(tau) - 0.5 * math.log(2 * math.pi)) - residual / (2 * tau**2)
+
+
+def cells(x, y, height, returns, shape, cell, low):
+    """Height in centimetres, state (0 void, 1 low, 2 high) and openness of cells, point by point and cell by cell.
+
+    North-west corner at (0, 0), `height` above ground in metres, `low` in centimetres.
+    """
+    held = {}
+    for east, north, h, many in zip(x, y, height, returns, strict=True):
+        r, c = math.floor(-north / cell), math.floor(east / cell)
+        if 0 <= r < shape[0] and 0 <= c < shape[1]:
+            held.setdefault((r, c), []).append((math.floor(100 * h + 0.5), many))
+    tops, state, openness = (np.zeros(shape, int) for _ in range(3))
+    for place, points in held.items():
+        high = [level for level, _ in points if level > low]
+        state[place] = 2 if 2 * len(high) > len(points) else 1
+        if state[place] == 2:
+            near = [level for level in high if level >= max(high) - 75]
+            tops[place] = sum(near) // len(near)
+            open_points = max(len(points) - len(high), sum(many > 1 for _, many in points))
+            openness[place] = 255 * open_points // len(points)
+
+    def around(r, c):
+        places = [(i, j) for i in range(r - 1, r + 2) for j in range(c - 1, c + 2) if (i, j) != (r, c)]
+        return [(i, j) for i, j in places if 0 <= i < shape[0] and 0 <= j < shape[1]]
+
+    before = state.copy()
+    for r, c in np.argwhere(before == 2):
+        if not any(before[p] == 2 and abs(tops[p] - tops[r, c]) <= 200 for p in around(r, c)):
+            state[r, c] = 0
+    tops[state == 0], openness[state == 0] = 0, 0
+    for _ in range(2):
+        before, old_tops, old_openness = state.copy(), tops.copy(), openness.copy()
+        for r, c in np.argwhere(before == 0):
+            known = [p for p in around(r, c) if before[p]]
+            high = [p for p in known if before[p] == 2]
+            if len(known) >= 3:
+                state[r, c] = 2 if 2 * len(high) > len(known) else 1
+            if state[r, c] == 2:
+                tops[r, c] = sum(old_tops[p] for p in high) // len(high)
+                openness[r, c] = sum(old_openness[p] for p in high) // len(high)
+    return tops, state, openness

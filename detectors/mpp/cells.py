@@ -131,19 +131,28 @@ def make_cells(
     cloud = (points.x, points.y, points.z)
     lowest = math.floor(100 * low)
 
+    height, state = np.empty(grid.shape, dtype=np.int32), np.empty(grid.shape, dtype=np.uint8)
+    openness, other = np.empty_like(state), np.empty_like(state)
+
     def work(first: int, last: int) -> None:
         _count(*cloud, returns, elevation, place, frame, first, last, grid.columns, lowest, counts)
         _add_tops(*cloud, elevation, place, frame, first, last, grid.columns, counts, tops)
+        _summarise(counts, tops, first, last, height, state, openness)
 
     workers.bands(work, grid.rows)
-    height, state, openness = _summarise(counts, tops, *grid.shape)
-    return Cells(grid, height, state, openness)
+    workers.bands(lambda first, last: _despike(height, state, first, last, other), grid.rows)
+    workers.bands(lambda first, last: _fill(height, openness, other, first, last, state), grid.rows)
+    workers.bands(lambda first, last: _fill(height, openness, state, first, last, other), grid.rows)
+    return Cells(grid, height, other, openness)
 
 
 @njit(cache=True, nogil=True, inline="always")
 def _cell_of(x, y, frame, first, last, columns):  # type: ignore[no-untyped-def]
     """Return the flat cell of a place, -1 outside rows first..last and outside the columns."""
     west, north, cell = frame
+    # Other threads' points are passed over before anything is divided.
+    if not ((first - 1) * cell < north - y < (last + 1) * cell):
+        return -1
     row, column = (north - y) / cell, (x - west) / cell
     if not (first <= row < last and 0 <= column < columns):
         return -1
@@ -201,57 +210,58 @@ def _add_tops(x, y, z, ground, place, frame, first, last, columns, counts, tops)
 
 
 @njit(cache=True, nogil=True)
-def _summarise(counts, tops, rows, columns):  # type: ignore[no-untyped-def]
-    height = np.zeros((rows, columns), dtype=np.int32)
-    state = np.zeros((rows, columns), dtype=np.uint8)
-    openness = np.zeros((rows, columns), dtype=np.uint8)
-    for r in range(rows):
+def _summarise(counts, tops, first, last, height, state, openness):  # type: ignore[no-untyped-def]
+    """Fill height, state and openness of some rows from what was counted."""
+    columns = state.shape[1]
+    for r in range(first, last):
         for c in range(columns):
             k = r * columns + c
             n, high, many = counts[k, 0], counts[k, 1], counts[k, 2]
+            height[r, c], openness[r, c] = 0, 0
             if n == 0:
-                continue
-            if 2 * high <= n:
+                state[r, c] = VOID
+            elif 2 * high <= n:
                 state[r, c] = LOW
-                continue
-            state[r, c] = HIGH
-            height[r, c] = tops[k, 1] // tops[k, 0]
-            openness[r, c] = (255 * max(n - high, many)) // n
-    _despike(height, state, openness)
-    for _ in range(2):
-        _fill(height, state, openness)
-    return height, state, openness
+            else:
+                state[r, c] = HIGH
+                height[r, c] = tops[k, 1] // tops[k, 0]
+                openness[r, c] = (255 * max(n - high, many)) // n
 
 
 @njit(cache=True, nogil=True)
-def _despike(height, state, openness):  # type: ignore[no-untyped-def]
-    """Empty the high cells whose height no neighbour shares to 2 m: birds, masts, chimneys, errors of the sensor."""
+def _despike(height, before, first, last, state):  # type: ignore[no-untyped-def]
+    """Fill the states of some rows, in which high cells are void whose height no neighbour shares to 2 m.
+
+    Birds, masts, chimneys and errors of the sensor are such cells.
+    """
     rows, columns = state.shape
-    before = state.copy()
-    for r in range(rows):
+    for r in range(first, last):
         for c in range(columns):
+            state[r, c] = before[r, c]
             if before[r, c] != HIGH:
                 continue
-            shared = False
+            shared = 0
             for i in range(max(r - 1, 0), min(r + 2, rows)):
                 for j in range(max(c - 1, 0), min(c + 2, columns)):
-                    if (i != r or j != c) and before[i, j] == HIGH and abs(height[i, j] - height[r, c]) <= _SPIKE:
-                        shared = True
-            if not shared:
+                    if before[i, j] == HIGH and abs(height[i, j] - height[r, c]) <= _SPIKE:
+                        shared += 1
+                # The cell itself is among them.
+                if shared > 1:
+                    break
+            if shared <= 1:
                 state[r, c] = VOID
-    for r in range(rows):
-        for c in range(columns):
-            if state[r, c] == VOID:
-                height[r, c], openness[r, c] = 0, 0
 
 
 @njit(cache=True, nogil=True)
-def _fill(height, state, openness):  # type: ignore[no-untyped-def]
-    """Give a void cell the majority of its neighbours when at least three of the eight are known."""
+def _fill(height, openness, before, first, last, state):  # type: ignore[no-untyped-def]
+    """Fill the states of some rows, in which void cells have that of most neighbours where three at least are known.
+
+    Their height and openness are set to go with it.
+    """
     rows, columns = state.shape
-    before = state.copy()
-    for r in range(rows):
+    for r in range(first, last):
         for c in range(columns):
+            state[r, c] = before[r, c]
             if before[r, c] != VOID:
                 continue
             known, high, rise, openly = 0, 0, 0, 0
@@ -263,8 +273,8 @@ def _fill(height, state, openness):  # type: ignore[no-untyped-def]
                         high += 1
                         rise += height[i, j]
                         openly += openness[i, j]
+            height[r, c], openness[r, c] = 0, 0
             if known >= 3:
-                state[r, c] = HIGH if 2 * high > known else LOW
+                state[r, c] = LOW
                 if 2 * high > known:
-                    height[r, c] = rise // high
-                    openness[r, c] = openly // high
+                    state[r, c], height[r, c], openness[r, c] = HIGH, rise // high, openly // high
