@@ -19,13 +19,13 @@ largest halls do not cut hills. Axis order of grids: (row, column), row 0 northe
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .lowest_points import default_cell, lowest_surface, mean_above
 from .points import PointCloud
 from .raster import Elevation, Grid
 
@@ -34,9 +34,6 @@ __all__ = ["elevation_from_points", "fill_unknown", "ground_surface"]
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
 
-#: Points in height within this many metres of a cell's lowest point support it, itself included; how many must, and
-#: which share of the points around.
-_SUPPORT_HEIGHT, _SUPPORT, _SUPPORT_SHARE = 1.0, 3, 0.05
 #: Size in metres of the blocks whose lowest heights tell the trend.
 _TREND_BLOCK = 5.0
 #: Windows up to this radius in metres remove what they remove, walls or not: shrubs and crowns have ragged borders.
@@ -138,68 +135,6 @@ def elevation_from_points(
     return Elevation(fill_unknown((mean + base).astype(np.float32).reshape(grid.shape)), grid)
 
 
-def default_cell(x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequence[float]) -> float:
-    """Return the cell size in metres at which an average covered cell holds two points, at least 1 m.
-
-    Cells of 4 m without points do not count as covered, so that water and a ragged border do not coarsen the grid.
-    """
-    coarse = Grid.covering(extent, 4.0)
-    index, inside = coarse.cells(x, y)
-    covered = np.count_nonzero(np.bincount(index[inside], minlength=1))
-    if covered == 0:
-        return 1.0
-    density = np.count_nonzero(inside) / (covered * 16.0)
-    return max(1.0, math.ceil(10 * math.sqrt(2.0 / density)) / 10)
-
-
-def lowest_surface(x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64], grid: Grid) -> _Floats:
-    """Return the lowest point of each cell that is not isolated, shape (rows, columns); NaN without one.
-
-    A lowest point is isolated when fewer than three points, or 5 % of the points, in its 5 x 5 cells lie within 1 m
-    of its height: a reflection from below the ground or a no-data height. It is passed over for the next lowest.
-    """
-    index, inside = grid.cells(x, y)
-    order = np.argsort(index[inside], kind="stable")
-    cells = index[inside][order]
-    heights = z[inside][order].astype(np.float32)
-    start = np.searchsorted(cells, np.arange(grid.rows * grid.columns + 1))
-    return _lowest_supported(heights, start, grid.rows, grid.columns)  # type: ignore[no-any-return]
-
-
-@njit(cache=True)
-def _lowest_supported(heights, start, rows, columns):  # type: ignore[no-untyped-def]
-    """Lowest supported height per cell; `heights` is grouped by cell, cell c holds ``start[c]:start[c + 1]``."""
-    lowest = np.full((rows, columns), np.nan, dtype=np.float32)
-    for row in range(rows):
-        for column in range(columns):
-            first, last = start[row * columns + column], start[row * columns + column + 1]
-            passed = -np.inf
-            while np.isnan(lowest[row, column]):
-                height = np.inf
-                for i in range(first, last):
-                    if passed < heights[i] < height:
-                        height = heights[i]
-                if height == np.inf:
-                    break
-                if _supported(heights, start, rows, columns, row, column, height):
-                    lowest[row, column] = height
-                passed = height
-    return lowest
-
-
-@njit(cache=True)
-def _supported(heights, start, rows, columns, row, column, height):  # type: ignore[no-untyped-def]
-    support, around = 0, 0
-    for r in range(max(row - 2, 0), min(row + 3, rows)):
-        first = start[r * columns + max(column - 2, 0)]
-        last = start[r * columns + min(column + 2, columns - 1) + 1]
-        around += last - first
-        for i in range(first, last):
-            if abs(heights[i] - height) < _SUPPORT_HEIGHT:
-                support += 1
-    return support >= max(_SUPPORT, _SUPPORT_SHARE * around)
-
-
 def fill_unknown(values: _Floats) -> _Floats:
     """Return the values with NaN replaced by a smooth surface through the known ones (all NaN stays NaN).
 
@@ -296,9 +231,11 @@ def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
     trend = fill_unknown(np.where(known, trend, np.nan).astype(np.float32)).astype(np.float64)
     # Samples at the border lie beyond the centres of the outer blocks.
     outer = np.pad(trend, 1, mode="reflect", reflect_type="odd") if min(trend.shape) > 1 else np.pad(trend, 1, "edge")
-    row, column = np.indices(surface.shape)
     blocks = Elevation(outer.astype(np.float32), Grid(-block, block, block, rows + 2, columns + 2))
-    lie: _Floats = (blocks.sample(column + 0.5, -row - 0.5) + base).astype(np.float32)
+    lie = np.empty(surface.shape, dtype=np.float32)
+    column = np.arange(surface.shape[1])
+    for row in range(len(lie)):
+        lie[row] = blocks.sample(column + 0.5, -row - 0.5) + base
     return lie
 
 
@@ -408,11 +345,7 @@ def _averaged(
 ) -> Elevation:
     """Replace the lowest by the mean of the points within the tolerance of the ground: it is biased by the noise."""
     surface = Elevation(ground, grid)
-    index, inside = grid.cells(x, y)
-    above = np.where(inside, z - surface.sample(x, y), np.inf)
-    near = np.abs(above) < tolerance
-    size = grid.rows * grid.columns
-    count = np.bincount(index[near], minlength=size)
-    shift = np.bincount(index[near], weights=above[near], minlength=size) / np.maximum(count, 1)
-    known = np.where(count > 0, shift, np.nan).astype(np.float32).reshape(grid.shape)
-    return Elevation(ground + np.nan_to_num(fill_unknown(known)), grid) if count.any() else surface
+    known = mean_above(x, y, z, surface, tolerance=tolerance)
+    if np.isnan(known).all():
+        return surface
+    return Elevation(ground + np.nan_to_num(fill_unknown(known)), grid)

@@ -1,4 +1,4 @@
-"""Slow obvious oracle of the lowest supported point per cell."""
+"""Slow obvious oracles of the lowest supported point per cell and of the mean near a surface."""
 
 import numpy as np
 
@@ -15,3 +15,16 @@ def lowest_surface(x, y, z, grid):
                     lowest[r, c] = height
                     break
     return lowest
+
+
+def mean_above(x, y, z, surface, tolerance):
+    row, column = surface.grid.to_pixel(x, y)
+    above = z - surface.sample(x, y)
+    near = abs(above) < tolerance
+    mean = np.full(surface.grid.shape, np.nan)
+    for r in range(mean.shape[0]):
+        for c in range(mean.shape[1]):
+            held = near & (row >= r) & (row < r + 1) & (column >= c) & (column < c + 1)
+            if held.any():
+                mean[r, c] = above[held].mean()
+    return mean

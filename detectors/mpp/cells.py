@@ -28,6 +28,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from ...scenes.lowest_points import coverage
 from ...scenes.points import PointCloud
 from ...scenes.raster import Elevation, Grid
 from .workers import ALONE, Workers
@@ -75,27 +76,14 @@ def cell_size(
     """
     coarse = Grid.covering(extent, 4.0)
     edges = [len(x) * part // workers.count for part in range(workers.count + 1)]
-    place = (coarse.west, coarse.north, coarse.rows, coarse.columns)
-    found = workers.map(lambda part: _coverage(x[slice(*part)], y[slice(*part)], *place), pairwise(edges))
+    place = (coarse.west, coarse.north, coarse.gsd, coarse.rows, coarse.columns)
+    found = workers.map(lambda part: coverage(x[slice(*part)], y[slice(*part)], *place), pairwise(edges))
     covered = np.count_nonzero(np.logical_or.reduce([seen for seen, _ in found]))
     points = sum(count for _, count in found)
     if points == 0:
         return 1.0
     spacing = math.sqrt(16.0 * covered / points)
     return min(max(math.ceil(4 * spacing - 0.2) / 4, 0.5), 2.0)
-
-
-@njit(cache=True, nogil=True)
-def _coverage(x, y, west, north, rows, columns):  # type: ignore[no-untyped-def]
-    """Return which squares of 4 m hold a point, and how many points lie in any."""
-    seen = np.zeros((rows, columns), dtype=np.bool_)
-    points = 0
-    for i in range(len(x)):
-        column, row = (x[i] - west) * 0.25, (north - y[i]) * 0.25
-        if 0 <= column < columns and 0 <= row < rows:
-            points += 1
-            seen[int(row), int(column)] = True
-    return seen, points
 
 
 def make_cells(

@@ -1,6 +1,6 @@
 """From the cloud to what the sampler reads: cells, classes, tables and boxes.
 
-At 40 bytes a cell the tables and what they are made of are the most that is held at once; arrays are let go as soon as
+At 38 bytes a cell the tables and what they are made of are the most that is held at once; arrays are let go as soon as
 they have served.
 """
 
@@ -24,7 +24,7 @@ from .cells import Cells, cell_size, make_cells
 from .energy import Model, own_energies
 from .memory import give_back
 from .superstructures import lower_superstructures
-from .tables import LONGEST, Tables, make_tables
+from .tables import LONGEST, TALLEST, Tables, make_tables
 from .workers import Workers
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ class Prepared:
     ----------
     grid : Grid
         Of the cells.
-    height : ndarray of int32, shape (rows, columns)
-        Centimetres above ground of high cells.
+    height : ndarray of uint16, shape (rows, columns)
+        Centimetres above ground of high cells, at most `tables.TALLEST`.
     state : ndarray of uint8, shape (rows, columns)
         See `cells`.
     score : ndarray of int16, shape (rows, columns)
@@ -56,7 +56,7 @@ class Prepared:
     """
 
     grid: Grid
-    height: NDArray[np.int32]
+    height: NDArray[np.uint16]
     state: NDArray[np.uint8]
     score: NDArray[np.int16]
     background: Background
@@ -80,14 +80,17 @@ def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers)
     if parameters.data_births > 0 or parameters.start == "greedy":
         least = math.ceil(6 / cell**2)
         boxes = propose_boxes(height, fitted, steps=(0.4, 1.0, 1000.0), least_cells=least, workers=workers)
+    # From here on heights are only read: two bytes hold them.
+    kept = np.minimum(height, TALLEST).astype(np.uint16)
+    del height
     give_back()
-    tables = make_tables(height, fitted, score, workers=workers)
+    tables = make_tables(kept, fitted, score, workers=workers)
     model = _model(parameters, cell)
     energies = own_energies(tables.small, tables.large, boxes, model)
     order = np.argsort(energies, kind="stable")
     boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
     grid = Grid.covering(scene.extent, cell)
-    return Prepared(grid, height, state, score, background, tables, model, boxes, weights)
+    return Prepared(grid, kept, state, score, background, tables, model, boxes, weights)
 
 
 def _classes(

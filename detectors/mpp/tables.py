@@ -49,13 +49,17 @@ class Tables:
 
 
 def make_tables(
-    height: NDArray[np.int32], high: NDArray[np.bool_], score: NDArray[np.int16], *, workers: Workers = ALONE
+    height: NDArray[np.int32] | NDArray[np.uint16],
+    high: NDArray[np.bool_],
+    score: NDArray[np.int16],
+    *,
+    workers: Workers = ALONE,
 ) -> Tables:
     """Sum up the rows.
 
     Parameters
     ----------
-    height : ndarray of int32, shape (rows, columns)
+    height : ndarray of int32 or uint16, shape (rows, columns)
         Centimetres; read where `high`.
     high : ndarray of bool, shape (rows, columns)
     score : ndarray of int16, shape (rows, columns)

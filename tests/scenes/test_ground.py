@@ -4,9 +4,10 @@ import pytest
 from shapely import box, contains_xy
 from shapely.affinity import rotate
 
-from roofbench.scenes.ground import elevation_from_points, fill_unknown, ground_surface, lowest_surface
+from roofbench.scenes.ground import elevation_from_points, fill_unknown, ground_surface
+from roofbench.scenes.lowest_points import default_cell, lowest_surface, mean_above
 from roofbench.scenes.points import PointCloud
-from roofbench.scenes.raster import Grid
+from roofbench.scenes.raster import Elevation, Grid
 
 EXTENT = (1000.0, 2000.0, 1160.0, 2120.0)
 
@@ -116,6 +117,29 @@ def test_the_lowest_surface_equals_the_oracle():
     # Heights are compared as float32, so the oracle gets the same.
     z = z.astype(np.float32).astype(np.float64)
     np.testing.assert_array_equal(lowest_surface(x, y, z, grid), naive_ground.lowest_surface(x, y, z, grid))
+
+
+def test_the_default_cell_holds_two_points_where_there_are_any():
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(0, 200, 10_000), rng.uniform(0, 100, 10_000)
+    assert default_cell(x, y, (0, 0, 200, 100)) == pytest.approx(2.0, abs=0.15)
+    assert default_cell(x, y, (0, 0, 2000, 1000)) == default_cell(x, y, (0, 0, 200, 100))
+    assert default_cell(np.repeat(x, 20), np.repeat(y, 20), (0, 0, 200, 100)) == 1.0
+    assert default_cell(x, y, (500, 500, 600, 600)) == 1.0
+
+
+def test_the_mean_near_a_surface_equals_the_oracle():
+    rng = np.random.default_rng(4)
+    grid = Grid.covering((0, 0, 12, 9), 1.0)
+    surface = Elevation(rng.normal(300, 0.2, grid.shape).astype(np.float32), grid)
+    x, y = rng.uniform(-1, 13, 400_000), rng.uniform(-1, 10, 400_000)
+    x[:200_000], y[:200_000] = rng.uniform(0, 11, 200_000), rng.uniform(3, 9, 200_000)
+    x[-1], y[-2] = np.nan, np.inf
+    z = surface.sample(x, y) + rng.choice([-2.0, 0.1, 5.0], len(x)) + rng.normal(0, 0.3, len(x))
+    z[(y < 2) & (x < 3)] = 350.0
+    mean = naive_ground.mean_above(x, y, z, surface, 0.4)
+    assert np.isnan(mean).any()
+    np.testing.assert_allclose(mean_above(x, y, z, surface, tolerance=0.4), mean, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (31, 50), (64, 33)])
