@@ -88,3 +88,12 @@ def cells(x, y, height, returns, shape, cell, low):
                 tops[r, c] = sum(old_tops[p] for p in high) // len(high)
                 openness[r, c] = sum(old_openness[p] for p in high) // len(high)
     return tops, state, openness
+
+
+def restrained(score, high, reach):
+    """Scores, those of high cells at most the mean (rounded down) of the high cells at most `reach` away."""
+    result = score.copy()
+    for r, c in np.argwhere(high):
+        near = np.s_[max(r - reach, 0) : r + reach + 1, max(c - reach, 0) : c + reach + 1]
+        result[r, c] = min(score[r, c], np.floor(score[near][high[near]].mean()))
+    return result

@@ -15,7 +15,9 @@ evidence
     log p(texture | roof) - log p(texture | crown), nats.
 score
     What a cell adds to a rectangle besides the fit of its roof: for a high cell with evidence for a roof, evidence -
-    log p(height | crown); with evidence against it, the evidence; for a low and for a void cell a fixed price.
+    log p(height | crown); with evidence against it, the evidence; for a low and for a void cell a fixed price. A high
+    cell has no more than the mean of the high cells within `_AROUND` metres: in a crown of few points smooth places lie
+    among rough ones by chance, and a rectangle could be drawn around each handful of them.
 
 Texture of the two classes is estimated from the scene by EM (expectation maximisation) on a histogram of cells, and
 held near what roofs and crowns are by pseudo-counts, so that a scene of roofs alone or of crowns alone keeps two
@@ -35,7 +37,7 @@ from .cells import HIGH, LOW, Cells
 from .tables import MILLI
 from .workers import ALONE, Workers
 
-__all__ = ["Background", "estimate_background", "score_cells", "textures"]
+__all__ = ["Background", "estimate_background", "restrain", "score_cells", "textures"]
 
 #: Bins of the histogram: log roughness from 1 cm to 4 m, openness from 0 to 1.
 _ROUGH_BINS, _OPEN_BINS = 24, 8
@@ -46,6 +48,8 @@ _ROOF_OPEN = (0.70, 0.12, 0.07, 0.04, 0.03, 0.02, 0.01, 0.01)
 _CROWN_OPEN = (0.22, 0.10, 0.10, 0.10, 0.10, 0.12, 0.12, 0.14)
 #: log p(height | crown) is not less than this, so that a bird or a tower is no proof of anything.
 _HEIGHT_FLOOR = -5.0
+#: Metres along x and y within which the scores of high cells are averaged.
+_AROUND = 1.0
 #: A high cell that no window holds (a pole, a wall, the rim of a crown) has this evidence.
 _THIN = -1.0
 
@@ -247,7 +251,27 @@ def score_cells(
         _score(cells.height, cells.state, bins, evidence, crowns, fit_weight, prices, first, last, score, fitted)
 
     workers.bands(work, len(bins))
-    return score, fitted
+    reach, modest = max(1, round(_AROUND / cells.grid.gsd)), np.empty_like(score)
+    workers.bands(lambda first, last: restrain(score, cells.state, reach, first, last, modest), len(bins))
+    return modest, fitted
+
+
+@njit(cache=True, nogil=True)
+def restrain(score, state, reach, first, last, modest):  # type: ignore[no-untyped-def]
+    """Fill the scores of some rows, of high cells at most the mean of the high cells within some rows and columns."""
+    rows, columns = score.shape
+    for r in range(first, last):
+        for c in range(columns):
+            modest[r, c] = score[r, c]
+            if state[r, c] != HIGH:
+                continue
+            total, many = 0, 0
+            for i in range(max(r - reach, 0), min(r + reach + 1, rows)):
+                for j in range(max(c - reach, 0), min(c + reach + 1, columns)):
+                    if state[i, j] == HIGH:
+                        total += score[i, j]
+                        many += 1
+            modest[r, c] = min(np.int64(score[r, c]), total // many)
 
 
 @njit(cache=True, nogil=True, inline="always")
