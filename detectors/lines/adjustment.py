@@ -29,12 +29,17 @@ def rotation_between(direction: float, reference: float) -> float:
 
 @njit(cache=True)
 def _nearest_rotations(
-    lines: NDArray[np.float64], order: NDArray[np.int64], radius: float, tolerance: float, longer_only: bool
+    lines: NDArray[np.float64],
+    order: NDArray[np.int64],
+    references: int,
+    radius: float,
+    tolerance: float,
+    longer_only: bool,
 ) -> NDArray[np.float64]:
     n = len(lines)
     angles = np.arctan2(lines[:, UY], lines[:, UX])
     rotation = np.full(n, np.nan)
-    for place in range(n):
+    for place in range(references):
         i = order[place]
         for other in range(place + 1 if longer_only else 0, n):
             j = order[other]
@@ -60,7 +65,9 @@ def by_length(lines: Boxes) -> NDArray[np.int64]:
     return np.argsort(-lengths(lines), kind="stable").astype(np.int64)
 
 
-def adjust_to_neighbours(lines: Boxes, *, radius: float, tolerance: float, longer_only: bool) -> NDArray[np.float64]:
+def adjust_to_neighbours(
+    lines: Boxes, *, radius: float, tolerance: float, longer_only: bool, share: float = 1.0
+) -> NDArray[np.float64]:
     """Return the smallest rotation of each line towards a line whose centre is near, radians, NaN without any.
 
     Parameters
@@ -71,8 +78,13 @@ def adjust_to_neighbours(lines: Boxes, *, radius: float, tolerance: float, longe
         Largest rotation, radians.
     longer_only : bool
         Whether only longer lines are references; else every line is one for every other.
+    share : float
+        Share of the lines, the longest first, that are references at all.
     """
-    rotation: NDArray[np.float64] = _nearest_rotations(lines, by_length(lines), radius, tolerance, longer_only)
+    references = math.ceil(share * len(lines))
+    rotation: NDArray[np.float64] = _nearest_rotations(
+        lines, by_length(lines), references, radius, tolerance, longer_only
+    )
     return rotation
 
 

@@ -35,6 +35,12 @@ class Original(LineDetector):
         doc="which lines a line is turned to: longer ones, for which the print sorts them by length, or any near it",
         source="2010, 3.3.2; reading",
     )  # fmt: skip
+    adjustment_share: float = parameter(
+        1.0, minimum=0, maximum=1,
+        doc="share of the lines, the longest first, that others are turned to; the print ends the iteration optionally "
+        "after half of them",
+        source="2010, 3.3.2",
+    )  # fmt: skip
 
     def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         beside = mean_in_boxes(rasters.cover.vegetation, band(lines, self.band_width / rasters.gsd, 0.0))
@@ -46,4 +52,5 @@ class Original(LineDetector):
             radius=self.adjustment_radius / gsd,
             tolerance=np.radians(self.adjustment_angle),
             longer_only=self.adjustment_reference == "longer",
+            share=self.adjustment_share,
         )
