@@ -24,6 +24,7 @@ from .boxes import Boxes, box_corners, lengths, prefix_sums, widths
 from .colours import Colours
 from .contours import trace_shapes
 from .corners import find_corners
+from .duplicates import find_duplicates
 from .extension import Cover, Growth, extend_lines, last_step
 from .final import FinalRules, final_rectangles
 from .masks import build_masks, ground_heights, point_spacing
@@ -203,6 +204,12 @@ class LineDetector(Detector):
         doc="size of an initial rectangle in the test that drops it when it lies wholly inside a final one",
         source="2010, 3.4; reading",
     )  # fmt: skip
+    new_share: float = parameter(
+        0.2, minimum=0, maximum=1, swept=(0.0, 0.1, 0.15, 0.2, 0.3),
+        doc="least share of a final rectangle that lies in no larger one; less is the same building seen again, "
+        "0 keeps all as printed",
+        source="2010, 3.4, which overlap is natural; reading",
+    )  # fmt: skip
 
     def run(self, rasters: Rasters) -> Trace:
         """Run all steps that follow the masks, keeping the intermediate results."""
@@ -223,6 +230,9 @@ class LineDetector(Detector):
         votes = self._votes(lines, rotation, edges, segments.shapes, fates, rasters.gsd)
         initial, initial_fates, candidates = self._rectangles(rasters, lines, fates)
         texture = self._judged(candidates, edges, rasters)
+        buildings = np.ones(len(candidates), dtype=np.bool_) if texture is None else np.any(texture.passed, axis=1)
+        duplicates = np.zeros(len(candidates), dtype=np.bool_)
+        duplicates[buildings] = find_duplicates(candidates[buildings], self.new_share)
         return Trace(
             image=rasters.image,
             masks=rasters.masks,
@@ -235,7 +245,8 @@ class LineDetector(Detector):
             initial=initial,
             initial_fates=initial_fates,
             candidates=candidates,
-            kept=np.ones(len(candidates), dtype=np.bool_) if texture is None else np.any(texture.passed, axis=1),
+            duplicates=duplicates,
+            kept=buildings & ~duplicates,
             votes=votes,
             texture=texture,
         )

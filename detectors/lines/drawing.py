@@ -34,7 +34,7 @@ _FATE_COLOURS = {
     Fate.OUTVOTED: "#e6007e",
     Fate.BORDER: "#707070",
 }
-_KEPT, _LOST = "#ffd400", "#ff2a2a"
+_KEPT, _LOST, _TWICE = "#ffd400", "#ff2a2a", "#00d5e0"
 
 
 def draw_steps(trace: Trace) -> Iterator[Step]:
@@ -69,9 +69,10 @@ def draw_steps(trace: Trace) -> Iterator[Step]:
 
 
 def _final_caption(trace: Trace) -> str:
+    caption = "Final rectangles (yellow), those dropped because larger ones cover them (cyan, dashed)"
     if trace.texture is None:
-        return "Final rectangles (yellow)."
-    return "Final rectangles (yellow, with the tests passed) and candidates without texture of a building (red)."
+        return f"{caption}."
+    return f"{caption}, candidates without texture of a building (red); digits: the tests passed."
 
 
 def _axes(figure: Figure, trace: Trace) -> Axes:
@@ -209,10 +210,11 @@ def _votes(figure: Figure, trace: Trace) -> None:
 def _final(figure: Figure, trace: Trace) -> None:
     axes = _axes(figure, trace)
     _show_photograph(axes, trace)
-    _outlines(axes, trace.final, _KEPT, linewidths=1.4)
-    lost = trace.candidates[~trace.kept]
+    twice, lost = trace.candidates[trace.duplicates], trace.candidates[~trace.kept & ~trace.duplicates]
+    _outlines(axes, twice, _TWICE, linewidths=0.8, linestyles="--")
     _outlines(axes, lost, _LOST, linewidths=1.0)
-    entries = [("building", _KEPT, len(trace.final))]
+    _outlines(axes, trace.final, _KEPT, linewidths=1.4)
+    entries = [("building", _KEPT, len(trace.final)), ("seen again", _TWICE, len(twice))]
     if trace.texture is not None:
         entries.append(("no texture of a building", _LOST, len(lost)))
         # Off the centre, which rectangles of one house share.
@@ -226,7 +228,8 @@ def _final(figure: Figure, trace: Trace) -> None:
 
 def _histograms(figure: Figure, trace: Trace, texture: Texture) -> None:
     by_area = np.argsort(-(box_areas := _areas(trace)), kind="stable")
-    chosen = [*by_area[trace.kept[by_area]][:6], *by_area[~trace.kept[by_area]][:6]]
+    passing = trace.kept | trace.duplicates
+    chosen = [*by_area[passing[by_area]][:6], *by_area[~passing[by_area]][:6]]
     figure.set_size_inches(12, 7.5)
     figure.set_layout_engine("constrained")
     if not chosen:
@@ -236,7 +239,7 @@ def _histograms(figure: Figure, trace: Trace, texture: Texture) -> None:
     degrees = -92.5 + 5.0 * np.arange(BIN_COUNT) + 2.5
     for axes, candidate in zip(panels.flat, chosen, strict=False):
         histogram = texture.collective[candidate]
-        axes.bar(degrees, histogram, width=4.4, color="#0050d0" if trace.kept[candidate] else _LOST)
+        axes.bar(degrees, histogram, width=4.4, color="#0050d0" if passing[candidate] else _LOST)
         axes.axhline(histogram.mean(), color="black", lw=0.8, ls="--")
         tests = ", ".join(f"T{number + 1}" for number in np.flatnonzero(texture.passed[candidate]))
         axes.set_title(f"{box_areas[candidate]:.0f} m²: {tests or 'no test'}", fontsize=8)

@@ -63,8 +63,10 @@ class Trace:
         Index of each one's candidate, or -1 when it lay inside one.
     candidates : ndarray, shape (k, 8)
         Extended rectangles.
+    duplicates : ndarray of bool, shape (k,)
+        Candidates with the texture of a building that larger ones cover already.
     kept : ndarray of bool, shape (k,)
-        Which candidates are buildings.
+        Which candidates are buildings, each seen once.
     votes : ndarray, shape (n, 4), optional
         Votes v1 to v4 of each line, NaN without a vote.
     texture : Texture, optional
@@ -82,6 +84,7 @@ class Trace:
     initial: Boxes
     initial_fates: NDArray[np.int64]
     candidates: Boxes
+    duplicates: NDArray[np.bool_]
     kept: NDArray[np.bool_]
     votes: NDArray[np.float64] | None = None
     texture: Texture | None = None
@@ -103,9 +106,10 @@ class Trace:
         counted["lines kept by entropy"] = int(self.rescued.sum())
         counted["initial rectangles"] = len(self.initial)
         counted["initial rectangles inside a final one"] = int((self.initial_fates < 0).sum())
+        counted["final rectangles that larger ones cover"] = int(self.duplicates.sum())
         counted["final rectangles"] = int(self.kept.sum())
         if self.texture is not None:
-            counted["candidates without texture of a building"] = int((~self.kept).sum())
+            counted["candidates without texture of a building"] = int((~self.kept & ~self.duplicates).sum())
             passed = self.texture.passed
             alone = passed & (passed.sum(axis=1) == 1)[:, None]
             counted |= {f"candidates kept by test {k + 1} alone": int(alone[:, k].sum()) for k in range(6)}

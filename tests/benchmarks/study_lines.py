@@ -206,7 +206,7 @@ def loss_of(reference, trace, lines, detected):
     if (fates == Fate.RECTANGLE).any():
         from roofbench.detectors.lines.boxes import box_corners
 
-        corners = box_corners(trace.candidates[~trace.kept])
+        corners = box_corners(trace.candidates[~trace.kept & ~trace.duplicates])
         lost = shapely.polygons(np.stack(trace.grid.to_world(corners[..., 1], corners[..., 0]), axis=-1))
         covers = shapely.area(shapely.intersection(lost, reference)) > 0.4 * reference.area
         return "texture" if covers.any() else "rectangle elsewhere"
