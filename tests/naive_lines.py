@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import shapely
 
-from roofbench.detectors.lines.boxes import OX, OY, U0, U1, UX, UY, V0, V1
+from roofbench.detectors.lines.boxes import OX, OY, U0, U1, UX, UY, V0, V1, box_corners
 
 
 def cells_in_box(box: np.ndarray, rows: int, columns: int) -> np.ndarray:
@@ -92,3 +93,22 @@ def length_in_box(line: np.ndarray, box: np.ndarray, steps: int = 20000) -> floa
     u, v = dx * box[UX] + dy * box[UY], -dx * box[UY] + dy * box[UX]
     inside = (u >= box[U0]) & (u <= box[U1]) & (v >= box[V0]) & (v <= box[V1])
     return float(inside.mean() * (line[U1] - line[U0]))
+
+
+def new_share(box: np.ndarray, others: np.ndarray) -> float:
+    """Share of a box outside the union of others, by exact areas."""
+    polygon = shapely.polygons(box_corners(box[None]))[0]
+    union = shapely.union_all(shapely.polygons(box_corners(others)))
+    return polygon.difference(union).area / polygon.area
+
+
+def duplicates(boxes: np.ndarray, least: float, tolerance: float) -> np.ndarray:
+    """Rectangles whose new share beyond the larger turned ones that stay is below `least`, one after another."""
+    degrees = np.degrees(np.arctan2(boxes[:, UY], boxes[:, UX]))
+    area = (boxes[:, U1] - boxes[:, U0]) * (boxes[:, V1] - boxes[:, V0])
+    stays: list[int] = []
+    for i in sorted(range(len(boxes)), key=lambda k: -area[k]):
+        turned = [j for j in stays if min((degrees[i] - degrees[j]) % 90, (degrees[j] - degrees[i]) % 90) > tolerance]
+        if new_share(boxes[i], boxes[turned]) >= least:
+            stays.append(i)
+    return np.isin(range(len(boxes)), stays, invert=True)

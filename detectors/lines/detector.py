@@ -205,10 +205,15 @@ class LineDetector(Detector):
         source="2010, 3.4; reading",
     )  # fmt: skip
     new_share: float = parameter(
-        0.2, minimum=0, maximum=1, swept=(0.0, 0.1, 0.15, 0.2, 0.3),
-        doc="least share of a final rectangle that lies in no larger one; less is the same building seen again, "
-        "0 keeps all as printed",
-        source="2010, 3.4, which overlap is natural; reading",
+        0.1, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
+        doc="least share of a final rectangle outside the larger ones against which it is turned; with less it is the "
+        "same building seen again; 0 keeps all, as printed",
+        source="2010, 3.4: parts adjoin at right angles; reading",
+    )  # fmt: skip
+    parallel_angle: float = parameter(
+        3.0, unit="deg", minimum=0, maximum=45,
+        doc="largest angle between final rectangles that count as parallel or perpendicular",
+        source="2010, 3.4; reading",
     )  # fmt: skip
 
     def run(self, rasters: Rasters) -> Trace:
@@ -232,7 +237,9 @@ class LineDetector(Detector):
         texture = self._judged(candidates, edges, rasters)
         buildings = np.ones(len(candidates), dtype=np.bool_) if texture is None else np.any(texture.passed, axis=1)
         duplicates = np.zeros(len(candidates), dtype=np.bool_)
-        duplicates[buildings] = find_duplicates(candidates[buildings], self.new_share)
+        duplicates[buildings] = find_duplicates(
+            candidates[buildings], least=self.new_share, tolerance=np.radians(self.parallel_angle)
+        )
         return Trace(
             image=rasters.image,
             masks=rasters.masks,

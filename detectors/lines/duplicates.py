@@ -1,20 +1,24 @@
-"""Duplicates: final rectangles that see again what larger ones have seen.
+"""Duplicates: turned rectangles that see again what larger ones have seen.
 
-The *new share* of a rectangle is the share of its area that lies in none of the larger rectangles that stay. A part of
-an L, T, U or C shaped building overlaps the others too, a *natural overlap*, but reaches beyond them; a *duplicate*
-adds hardly more than the corners by which it is turned or shifted.
-The 2010 paper (section 3.4) finds it "hard to decide which overlap is unexpected and which is natural" and drops an
-initial rectangle that is "completely within" a final one before it is extended. A rectangle that a short jagged line
-made lies across the sides of the one before it, so it is never completely within; judging it against all larger ones
-together, after extension, is a reading of ours.
+Two rectangles are *turned* against each other when they are neither parallel nor perpendicular. The parts of an L, T, U
+or C shaped building adjoin at right angles, so their overlap is *natural*; that of turned rectangles is not. The *new
+share* of a rectangle is the share of its area that lies in none of the larger rectangles against which it is turned; a
+*duplicate* has next to none: it adds little more than the corners by which it is turned.
+
+The 2010 paper (section 3.4) joins "perpendicular" parts, finds it "hard to decide which overlap is unexpected and which
+is natural", and drops an initial rectangle that is "completely within" a final one. A rectangle that a short jagged
+line made lies across the sides of the one before it and so is never completely within it.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .adjustment import rotation_between
 from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, Boxes, box_centres, lengths, to_box, widths
 
 __all__ = ["find_duplicates"]
@@ -42,12 +46,28 @@ def new_share(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
     return new / _LATTICE**2
 
 
-def find_duplicates(boxes: Boxes, least: float) -> NDArray[np.bool_]:
-    """Tell which rectangles are duplicates: largest first, those whose new share is below `least`, shape (n,)."""
-    area = lengths(boxes) * widths(boxes)
+def find_duplicates(boxes: Boxes, *, least: float, tolerance: float) -> NDArray[np.bool_]:
+    """Tell which rectangles are duplicates of larger ones that are none, shape (n,).
+
+    Parameters
+    ----------
+    least : float
+        Least new share of a rectangle that is no duplicate.
+    tolerance : float
+        Largest angle between rectangles that count as parallel or perpendicular, radians.
+    """
+    directions = np.arctan2(boxes[:, UY], boxes[:, UX])
     centres, radius = box_centres(boxes), np.hypot(lengths(boxes), widths(boxes)) / 2
-    stays = np.zeros(len(boxes), dtype=np.bool_)
-    for i in np.argsort(-area, kind="stable"):
-        near = stays & (np.hypot(*(centres - centres[i]).T) < radius + radius[i])
-        stays[i] = new_share(boxes[i], boxes[near]) >= least
-    return ~stays
+    stays: list[int] = []
+    for i in np.argsort(-lengths(boxes) * widths(boxes), kind="stable"):
+        turned = [
+            j
+            for j in stays
+            if math.dist(centres[i], centres[j]) < radius[i] + radius[j]
+            and abs(rotation_between(directions[i], directions[j])) > tolerance
+        ]
+        if not turned or new_share(boxes[i], boxes[turned]) >= least:
+            stays.append(int(i))
+    duplicates = np.ones(len(boxes), dtype=np.bool_)
+    duplicates[stays] = False
+    return duplicates

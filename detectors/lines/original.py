@@ -36,9 +36,8 @@ class Original(LineDetector):
         source="2010, 3.3.2; reading",
     )  # fmt: skip
     adjustment_share: float = parameter(
-        1.0, minimum=0, maximum=1,
-        doc="share of the lines, the longest first, that others are turned to; the print ends the iteration optionally "
-        "after half of them",
+        0.5, minimum=0, maximum=1,
+        doc="share of the lines, the longest first, that others are turned to; optional in the print, 1 is all",
         source="2010, 3.3.2",
     )  # fmt: skip
 

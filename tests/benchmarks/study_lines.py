@@ -30,6 +30,7 @@ ABLATIONS = {
         "ground=tile-mode",
         "vegetation=pseudo-ndvi",
         "adjustment_reference=any",
+        "adjustment_share=1",
         "missed_corner=1000",
         "curve_step=0.15",
         "extension_part=1000",
@@ -39,6 +40,8 @@ ABLATIONS = {
         "inside_margin=0",
         "rise=0",
         "compare=whole",
+        "new_share=0",
+        "new_share=0.2",
     ),
     "improved": (
         "marking=squares",
@@ -64,6 +67,7 @@ ABLATIONS = {
         "inside_share=1",
         "inside_margin=0",
         "rise=0",
+        "new_share=0.1",
     ),
 }
 #: Steps that the page shows.

@@ -7,6 +7,7 @@ import pytest
 from roofbench.detectors.lines.adjustment import adjust_to_neighbours, adjust_to_shape, rotate
 from roofbench.detectors.lines.boxes import U0, U1, UX, UY, V0, V1, prefix_sums
 from roofbench.detectors.lines.colours import Colours, dominant_bins, dominant_ranges, yiq_bins
+from roofbench.detectors.lines.duplicates import find_duplicates, new_share
 from roofbench.detectors.lines.extension import Cover, Growth, extend_lines, extend_rectangle
 from roofbench.detectors.lines.final import FinalRules, extend_final_side, lies_inside, shrink, strip_shares
 from roofbench.detectors.lines.rectangles import INSIDE, TOO_NARROW, initial_rectangles, share_inside
@@ -38,6 +39,14 @@ def test_longer_lines_are_turned_by_nothing_shorter():
     lines = np.array([line(0, 0, 0, 100), line(30, 0, 93, 40), line(60, 0, 5, 30), line(900, 0, 0, 50)])
     rotation = np.degrees(adjust_to_neighbours(lines, radius=100.0, tolerance=np.pi / 8, longer_only=True))
     np.testing.assert_allclose(rotation, [0, -3, -2, np.nan], atol=1e-9)
+
+
+def test_the_longest_share_of_the_lines_are_references():
+    lines = np.array([line(0, 0, 0, 100), line(30, 0, 93, 40), line(60, 0, 5, 30), line(90, 0, 6, 20)])
+    all_of_them = adjust_to_neighbours(lines, radius=200.0, tolerance=np.pi / 8, longer_only=True)
+    half = adjust_to_neighbours(lines, radius=200.0, tolerance=np.pi / 8, longer_only=True, share=0.5)
+    np.testing.assert_allclose(np.degrees(all_of_them), [0, -3, -2, -1], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(half), [0, -3, -2, -3], atol=1e-9)
 
 
 def test_lines_of_a_shape_are_turned_to_its_longest_and_odd_ones_drop_out():
@@ -143,6 +152,40 @@ def test_a_box_lies_inside_another_when_all_its_corners_do():
     assert lies_inside(turned, outer)
     turned[V1] = 5
     assert not lies_inside(turned + np.array([3, 3, 0, 0, 0, 0, 0, 0]), outer)
+
+
+def rectangles(rng, count):
+    """Return random rectangles on a place so small that most overlap."""
+    boxes = np.array([line(*rng.uniform(0, 120, 2), rng.uniform(0, 180), rng.uniform(20, 90)) for _ in range(count)])
+    boxes[:, V1] = rng.uniform(20, 60, count)
+    return boxes
+
+
+def test_the_new_share_of_a_rectangle_is_what_lies_outside_the_union_of_the_others():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        boxes = rectangles(rng, 6)
+        assert new_share(boxes[0], boxes[1:]) == pytest.approx(naive_lines.new_share(boxes[0], boxes[1:]), abs=0.02)
+    assert new_share(boxes[0], boxes[:0]) == 1
+    assert new_share(boxes[0], boxes[:1]) == 0
+
+
+def test_duplicates_are_those_that_larger_turned_rectangles_cover():
+    rng = np.random.default_rng(8)
+    boxes = rectangles(rng, 60)
+    boxes[::3, UX:U0] = 1.0, 0.0
+    found = find_duplicates(boxes, least=0.31, tolerance=np.radians(3))
+    np.testing.assert_array_equal(found, naive_lines.duplicates(boxes, 0.31, 3.0))
+    assert 5 < found.sum() < 55
+    assert not find_duplicates(boxes, least=0.0, tolerance=np.radians(3)).any()
+
+
+def test_a_wing_stays_however_much_of_it_lies_in_the_house_and_a_turned_rectangle_does_not():
+    house, wing, turned = line(50, 30, 0, 60), line(60, 30, 90, 40), line(50, 32, 14, 52)
+    house[V1], wing[V1], turned[V1] = 40, 15, 30
+    found = find_duplicates(np.array([wing, turned, house]), least=0.1, tolerance=np.radians(3))
+    assert found.tolist() == [False, True, False]
+    assert not find_duplicates(np.array([turned]), least=0.1, tolerance=np.radians(3)).any()
 
 
 @pytest.mark.parametrize(
