@@ -48,8 +48,9 @@ _OUTSET = 0.5
 _CURVE_STEP = 0.3
 #: Length of a side that is tested at a time, point spacings: the paper's 3 m at its spacing of 0.5 m.
 _EXTENSION_PART = 6.0
-#: Root mean square distance from its line at which a segment must have missed a corner, point spacings or pixels.
-_MISSED_CORNER = 0.5
+#: Root mean square distance from its line at which a segment must have missed a corner: point spacings, and pixels,
+#: whose staircase is no corner.
+_MISSED_CORNER, _STAIRCASE = 0.4, 0.5
 #: Threshold that no mean reaches: entropy is not used.
 _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
 
@@ -106,7 +107,8 @@ class LineDetector(Detector):
     )  # fmt: skip
     missed_corner: float | None = parameter(
         None, unit="m", minimum=0.01,
-        doc="RMS distance of a curve from its line above which it is split; none: half a point spacing or pixel",
+        doc="RMS distance of a curve from its line above which it is split; none: 0.4 point spacings, half a pixel "
+        "or more",
         source="not in the print; 1000 is none",
     )  # fmt: skip
     inside_reach: float = parameter(
@@ -356,7 +358,7 @@ class LineDetector(Detector):
             product=self.corner_product,
             straight=(self.corner_angle, 360.0 - self.corner_angle),
         )
-        missed = self.missed_corner or _MISSED_CORNER * max(rasters.spacing, gsd)
+        missed = self.missed_corner or max(_MISSED_CORNER * rasters.spacing, _STAIRCASE * gsd)
         segments = fit_segments(
             curves, points, corners, offsets, shortest=self.minimum_side / gsd - 2 * _OUTSET, deviation=missed / gsd
         )

@@ -17,7 +17,7 @@ from ...scenes.parameters import parameter
 from ...scenes.raster import Image
 from .adjustment import adjust_to_neighbours, adjust_to_shape
 from .boxes import Boxes, lengths, prefix_sums
-from .detector import LineDetector
+from .detector import PAPER_PIXEL, LineDetector
 from .entropy import grey_levels, local_entropy
 from .extension import band, mean_in_boxes
 from .image_edges import ImageEdges, extract_edges
@@ -70,10 +70,10 @@ class Improved(LineDetector):
     )
     edge_blur: float = parameter(
         1.5,
-        unit="px",
+        unit="px of 0.15 m",
         minimum=0,
-        doc="sigma of the Gaussian before image edges are detected; reading",
-        source="2011, 3.4",
+        doc="sigma of the Gaussian before image edges are detected",
+        source="2011, 3.4; reading",
     )
     edge_contrast: float = parameter(
         20.0, unit="grey levels", minimum=0, doc="least step in brightness that starts an image edge",
@@ -133,7 +133,7 @@ class Improved(LineDetector):
         return extract_edges(
             grey_levels(rasters.image),
             gsd=rasters.gsd,
-            blur=self.edge_blur,
+            blur=self.edge_blur * PAPER_PIXEL / rasters.gsd,
             contrast=self.edge_contrast,
             shortest=self.minimum_side,
             smoothing=self.smoothing,
