@@ -37,7 +37,7 @@ from .cells import HIGH, LOW, Cells
 from .tables import MILLI
 from .workers import ALONE, Workers
 
-__all__ = ["Background", "estimate_background", "restrain", "score_cells", "textures"]
+__all__ = ["Background", "estimate_background", "fitted_cells", "restrain", "score_cells", "textures"]
 
 #: Bins of the histogram: log roughness from 1 cm to 4 m, openness from 0 to 1.
 _ROUGH_BINS, _OPEN_BINS = 24, 8
@@ -145,10 +145,10 @@ def _choose_windows(windows, state, first, last, bins):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True)
-def _tally(bins, height):  # type: ignore[no-untyped-def]
-    """Return n, sum of heights, of their squares (centimetres) of the cells of each bin, shape (192, 3), int64."""
+def _tally(bins, height, first, last):  # type: ignore[no-untyped-def]
+    """Return n, sum of heights, of their squares (centimetres) of each bin in some rows, shape (192, 3), int64."""
     tally = np.zeros((_ROUGH_BINS * _OPEN_BINS, 3), dtype=np.int64)
-    for r in range(bins.shape[0]):
+    for r in range(first, last):
         for c in range(bins.shape[1]):
             k = bins[r, c]
             if k >= 0:
@@ -162,7 +162,7 @@ def _tally(bins, height):  # type: ignore[no-untyped-def]
 def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Background, NDArray[np.int16]]:
     """Estimate the classes of a scene; also return the bin of each cell's texture (-1: no window holds it)."""
     bins = textures(cells.height, cells.state, cells.openness, workers=workers)
-    tally = _tally(bins, cells.height)
+    tally = np.sum(workers.bands(lambda first, last: _tally(bins, cells.height, first, last), len(bins)), axis=0)
     counts = tally[:, 0].astype(np.float64).reshape(_ROUGH_BINS, _OPEN_BINS)
     rough = _LOG_LOW + (np.arange(_ROUGH_BINS) + 0.5) * (_LOG_HIGH - _LOG_LOW) / _ROUGH_BINS
     size_of_sample = int(counts.sum())
@@ -212,6 +212,48 @@ def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Back
     return background, bins
 
 
+def fitted_cells(
+    cells: Cells,
+    bins: NDArray[np.int16],
+    background: Background,
+    *,
+    texture_weight: float,
+    texture_limit: float,
+    workers: Workers = ALONE,
+) -> NDArray[np.bool_]:
+    """Return which cells take part in the fit of a roof: high ones whose texture does not speak against one.
+
+    A wall, a chimney or a branch over the eaves pays its evidence (see `score_cells`), but does not spoil the fit: a
+    Gaussian would let a few such cells outweigh a thousand good ones.
+
+    Parameters
+    ----------
+    cells : Cells
+    bins : ndarray of int16, shape (rows, columns)
+        As `textures` returns them.
+    background : Background
+    texture_weight, texture_limit : float
+        As for `score_cells`.
+    workers : Workers
+    """
+    evidence, thin = _evidence(background, texture_weight, texture_limit), texture_weight * _THIN
+    fitted = np.empty(bins.shape, dtype=np.bool_)
+    workers.bands(lambda first, last: _choose_fitted(cells.state, bins, evidence, thin, first, last, fitted), len(bins))
+    return fitted
+
+
+def _evidence(background: Background, weight: float, limit: float) -> NDArray[np.float64]:
+    """Return the evidence of each bin."""
+    return np.clip(weight * np.array(background.evidence), -limit, limit).ravel()
+
+
+@njit(cache=True, nogil=True)
+def _choose_fitted(state, bins, evidence, thin, first, last, fitted):  # type: ignore[no-untyped-def]
+    for r in range(first, last):
+        for c in range(state.shape[1]):
+            fitted[r, c] = state[r, c] == HIGH and (evidence[bins[r, c]] if bins[r, c] >= 0 else thin) >= 0.0
+
+
 def score_cells(
     cells: Cells,
     bins: NDArray[np.int16],
@@ -223,18 +265,17 @@ def score_cells(
     low_price: float,
     void_price: float,
     workers: Workers = ALONE,
-) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
-    """Return the score of each cell in thousandths of a nat, and whether its height takes part in the fit of a roof.
-
-    A high cell whose texture speaks against a roof (a wall, a chimney, a branch over the eaves) pays its evidence, but
-    does not spoil the fit: a Gaussian would let a few such cells outweigh a thousand good ones.
+) -> NDArray[np.int16]:
+    """Return the score of each cell in thousandths of a nat.
 
     Parameters
     ----------
     cells : Cells
-    bins : ndarray of int16
-        As `estimate_background` returns them.
+    bins : ndarray of int16, shape (rows, columns)
+        As `textures` returns them.
     background : Background
+    fit_weight : float
+        Factor of the likelihood of heights.
     texture_weight, texture_limit : float
         Factor of the evidence (windows of neighbours share cells, so they are no independent witnesses), and the
         bound of its absolute value, nats.
@@ -242,18 +283,18 @@ def score_cells(
         Nats that a low and a void cell cost.
     workers : Workers
     """
-    evidence = np.clip(texture_weight * np.array(background.evidence), -texture_limit, texture_limit).ravel()
-    score, fitted = np.empty(bins.shape, dtype=np.int16), np.empty(bins.shape, dtype=np.bool_)
+    evidence = _evidence(background, texture_weight, texture_limit)
+    score, modest = np.empty(bins.shape, dtype=np.int16), np.empty(bins.shape, dtype=np.int16)
     crowns = (background.crown_height, background.crown_spread)
     prices = (texture_weight * _THIN, low_price, void_price)
 
     def work(first: int, last: int) -> None:
-        _score(cells.height, cells.state, bins, evidence, crowns, fit_weight, prices, first, last, score, fitted)
+        _score(cells.height, cells.state, bins, evidence, crowns, fit_weight, prices, first, last, score)
 
     workers.bands(work, len(bins))
-    reach, modest = max(1, round(_AROUND / cells.grid.gsd)), np.empty_like(score)
+    reach = max(1, round(_AROUND / cells.grid.gsd))
     workers.bands(lambda first, last: restrain(score, cells.state, reach, first, last, modest), len(bins))
-    return modest, fitted
+    return modest
 
 
 @njit(cache=True, nogil=True)
@@ -281,13 +322,13 @@ def _milli(nats):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _score(height, state, bins, evidence, crowns, fit_weight, prices, first, last, score, fitted):  # type: ignore[no-untyped-def]
+def _score(height, state, bins, evidence, crowns, fit_weight, prices, first, last, score):  # type: ignore[no-untyped-def]
     mean, spread = crowns
     thin, low_price, void_price = prices
     level = -math.log(spread * math.sqrt(2.0 * math.pi))
     for r in range(first, last):
         for c in range(state.shape[1]):
-            score[r, c], fitted[r, c] = _milli(-void_price), False
+            score[r, c] = _milli(-void_price)
             if state[r, c] == LOW:
                 score[r, c] = _milli(-low_price)
             elif state[r, c] == HIGH:
@@ -295,6 +336,5 @@ def _score(height, state, bins, evidence, crowns, fit_weight, prices, first, las
                 if best < 0.0:
                     score[r, c] = _milli(best)
                     continue
-                fitted[r, c] = True
                 log_crown = level - 0.5 * ((0.01 * height[r, c] - mean) / spread) ** 2
                 score[r, c] = _milli(best - fit_weight * max(log_crown, _HEIGHT_FLOOR))

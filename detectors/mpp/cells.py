@@ -111,7 +111,7 @@ def make_cells(
     workers : Workers
     """
     size = grid.rows * grid.columns
-    counts, tops = np.zeros((size, 4), dtype=np.int32), np.zeros((size, 2), dtype=np.int32)
+    counts, tops = np.empty((size, 4), dtype=np.int32), np.empty((size, 2), dtype=np.int32)
     returns = points.number_of_returns
     if returns is None:
         returns = np.empty(0, dtype=np.uint8)
@@ -125,6 +125,8 @@ def make_cells(
     openness, other = np.empty_like(state), np.empty_like(state)
 
     def work(first: int, last: int) -> None:
+        mine = slice(first * grid.columns, last * grid.columns)
+        counts[mine], tops[mine] = 0, 0
         _count(*cloud, returns, elevation, place, frame, first, last, grid.columns, lowest, counts)
         _add_tops(*cloud, elevation, place, frame, first, last, grid.columns, counts, tops)
         _summarise(counts, tops, first, last, height, state, openness)

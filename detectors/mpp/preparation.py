@@ -18,7 +18,7 @@ from ...scenes.ground import fill_unknown, ground_surface
 from ...scenes.points import PointCloud
 from ...scenes.raster import Elevation, Grid
 from ...scenes.scene import Scene
-from .background import Background, estimate_background, score_cells, textures
+from .background import Background, estimate_background, fitted_cells, score_cells, textures
 from .candidates import propose_boxes
 from .cells import Cells, cell_size, make_cells
 from .energy import Model, own_energies
@@ -80,17 +80,28 @@ def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers)
     if parameters.data_births > 0 or parameters.start == "greedy":
         least = math.ceil(6 / cell**2)
         boxes = propose_boxes(height, fitted, steps=(0.4, 1.0, 1000.0), least_cells=least, workers=workers)
-    # From here on heights are only read: two bytes hold them.
-    kept = np.minimum(height, TALLEST).astype(np.uint16)
+    kept = _shortened(height, workers)
     del height
     give_back()
     tables = make_tables(kept, fitted, score, workers=workers)
-    model = _model(parameters, cell)
-    energies = own_energies(tables.small, tables.large, boxes, model)
+    model, sums = _model(parameters, cell), (tables.small, tables.large)
+    parts = workers.bands(lambda first, last: own_energies(*sums, boxes[first:last], model), len(boxes))
+    energies = np.concatenate([np.empty(0), *parts])
     order = np.argsort(energies, kind="stable")
     boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
     grid = Grid.covering(scene.extent, cell)
     return Prepared(grid, kept, state, score, background, tables, model, boxes, weights)
+
+
+def _shortened(height: NDArray[np.int32], workers: Workers) -> NDArray[np.uint16]:
+    """Return heights that are only read from here on: two bytes hold them."""
+    short = np.empty(height.shape, dtype=np.uint16)
+
+    def work(first: int, last: int) -> None:
+        np.minimum(height[first:last], TALLEST, out=short[first:last], casting="unsafe")
+
+    workers.bands(work, len(height))
+    return short
 
 
 def _classes(
@@ -104,8 +115,7 @@ def _classes(
     low = 0.8 * parameters.least_height
     cells = make_cells(points, ground, Grid.covering(scene.extent, cell), low=low, workers=workers)
     background, bins = estimate_background(cells, workers=workers)
-    score, fitted = _scored(parameters, cells, bins, background, workers)
-    del bins
+    fitted = _fitted(parameters, cells, bins, background, workers)
     if parameters.carried_share <= 1:
         height, state = lower_superstructures(
             cells.height,
@@ -118,14 +128,8 @@ def _classes(
         )
         cells = replace(cells, height=height, state=state)
         bins = textures(cells.height, cells.state, cells.openness, workers=workers)
-        score, fitted = _scored(parameters, cells, bins, background, workers)
-    return background, cells.height, cells.state, score, fitted
-
-
-def _scored(
-    parameters: MPP, cells: Cells, bins: NDArray[np.int16], background: Background, workers: Workers
-) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
-    return score_cells(
+        fitted = _fitted(parameters, cells, bins, background, workers)
+    score = score_cells(
         cells,
         bins,
         background,
@@ -136,6 +140,14 @@ def _scored(
         void_price=parameters.void_price,
         workers=workers,
     )
+    return background, cells.height, cells.state, score, fitted
+
+
+def _fitted(
+    parameters: MPP, cells: Cells, bins: NDArray[np.int16], background: Background, workers: Workers
+) -> NDArray[np.bool_]:
+    weight, limit = parameters.texture_weight, parameters.texture_limit
+    return fitted_cells(cells, bins, background, texture_weight=weight, texture_limit=limit, workers=workers)
 
 
 def _model(parameters: MPP, cell: float) -> Model:

@@ -92,12 +92,21 @@ def _lower_storeys(
 ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     """Return heights and states with the storeys of frames lowered."""
     rows, columns = state.shape
-    smooth, lowered, filled = height.copy(), height.copy(), state.copy()
-    solid = roof.copy()
-    workers.bands(lambda first, last: _add_ledges(height, state, first, last, solid), rows)
+    smooth, lowered, filled = np.empty_like(height), np.empty_like(height), np.empty_like(state)
+    solid = np.empty_like(roof)
+
+    def begin(first: int, last: int) -> None:
+        smooth[first:last], lowered[first:last], filled[first:last] = (
+            height[first:last],
+            height[first:last],
+            state[first:last],
+        )
+        _add_ledges(height, state, roof, first, last, solid)
+
+    workers.bands(begin, rows)
     labels, count = label_patches(smooth, solid, step, workers=workers)
     smooth_walls(smooth, state, labels, workers=workers)
-    solid = state == HIGH
+    workers.bands(lambda first, last: np.equal(state[first:last], HIGH, out=solid[first:last]), rows)
     workers.bands(lambda first, last: _add_shadows(state, first, last, solid), rows)
     workers.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
     boxes = np.concatenate(
@@ -126,15 +135,16 @@ def _add_shadows(state, first, last, solid):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _add_ledges(height, state, first, last, solid):  # type: ignore[no-untyped-def]
-    """Add the high cells that share their height with four of their eight neighbours, in place.
+def _add_ledges(height, state, roof, first, last, solid):  # type: ignore[no-untyped-def]
+    """Fill for some rows which cells are roof or, if high, share their height with four of their eight neighbours.
 
     A ledge around a tower is too narrow for a window of texture, and level nevertheless.
     """
     rows, columns = state.shape
-    for r in range(max(first, 1), min(last, rows - 1)):
-        for c in range(1, columns - 1):
-            if solid[r, c] or state[r, c] != HIGH:
+    for r in range(first, last):
+        for c in range(columns):
+            solid[r, c] = roof[r, c]
+            if roof[r, c] or state[r, c] != HIGH or r in (0, rows - 1) or c in (0, columns - 1):
                 continue
             level = 0
             for i in range(r - 1, r + 2):
@@ -153,7 +163,13 @@ def _fill_rough(
     workers: Workers,
 ) -> bool:
     """Level rough places that roof surrounds, in place; return whether there was any."""
-    places, count = label_patches(height, (state == HIGH) & (labels == 0), _ANY, workers=workers)
+    rough = np.empty(labels.shape, dtype=np.bool_)
+
+    def begin(first: int, last: int) -> None:
+        np.logical_and(state[first:last] == HIGH, labels[first:last] == 0, out=rough[first:last])
+
+    workers.bands(begin, len(rough))
+    places, count = label_patches(height, rough, _ANY, workers=workers)
     rims = count_rims(places, count, height, state, labels, fall=-_ANY, workers=workers)
     return _sink(height, labels, places, rims.carried(share) & (rims.cells <= most), _ANY, workers)
 

@@ -67,7 +67,7 @@ def make_tables(
     workers : Workers
     """
     rows, columns = height.shape
-    large = np.zeros((rows, columns + 1, 4), dtype=np.int64)
+    large = np.empty((rows, columns + 1, 4), dtype=np.int64)
     small = large.view(np.int32)
     workers.bands(lambda first, last: _sum_rows(height, high, score, first, last, small, large), rows)
     return Tables(small, large)
@@ -98,6 +98,7 @@ def _sum_rows(height, high, score, first, last, small, large):  # type: ignore[n
     for r in range(first, last):
         zero = np.int64(0)
         n, x, h, milli, xx, xh, hh = 0, 0, zero, 0, 0, zero, zero
+        large[r, 0, :] = 0
         for c in range(columns):
             if high[r, c]:
                 level = np.int64(min(height[r, c], TALLEST))

@@ -4,8 +4,10 @@ import naive_mpp as naive
 import numpy as np
 import pytest
 
-from roofbench.detectors.mpp.background import restrain
-from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, cell_size
+from roofbench.detectors.mpp.background import estimate_background, fitted_cells, restrain
+from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, Cells, cell_size
+from roofbench.detectors.mpp.workers import some_workers
+from roofbench.scenes.raster import Grid
 
 
 @pytest.mark.parametrize(
@@ -27,3 +29,25 @@ def test_a_score_of_a_high_cell_is_at_most_the_mean_around_it(reach):
         restrain(score, state, reach, first, last, found)
     np.testing.assert_array_equal(found, naive.restrained(score, state == HIGH, reach))
     assert (found < score).any()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7])
+def test_classes_and_fitted_cells_are_those_of_the_evidence_for_any_number_of_threads(count):
+    rng = np.random.default_rng(0)
+    grid = Grid(0.0, 30.0, 0.5, 60, 70)
+    state = np.kron(rng.choice([HIGH, LOW], (12, 14), p=[0.8, 0.2]), np.ones((5, 5), np.uint8))
+    height = np.kron(rng.integers(300, 1500, (12, 14)), np.ones((5, 5))) + rng.integers(0, 8, state.shape)
+    rough = np.kron(rng.random((12, 14)) < 0.4, np.ones((5, 5), bool))
+    height[rough] += rng.integers(0, 300, np.count_nonzero(rough))
+    openness = np.where(rough, rng.integers(0, 256, state.shape), 3).astype(np.uint8)
+    cells = Cells(grid, np.where(state == HIGH, height, 0).astype(np.int32), state, openness)
+    alone, bins = estimate_background(cells)
+    with some_workers(count) as workers:
+        background, same = estimate_background(cells, workers=workers)
+        fitted = fitted_cells(cells, bins, background, texture_weight=1.0, texture_limit=3.0, workers=workers)
+    assert background == alone
+    np.testing.assert_array_equal(same, bins)
+    evidence = np.array(background.evidence).ravel()
+    assert {np.sign(evidence[b]) for b in bins[bins >= 0]} == {-1.0, 1.0}
+    for place in np.ndindex(state.shape):
+        assert fitted[place] == (state[place] == HIGH and bins[place] >= 0 and evidence[bins[place]] >= 0)
