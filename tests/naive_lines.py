@@ -28,6 +28,20 @@ def distances(points, chosen: np.ndarray, grid) -> np.ndarray:
     return out
 
 
+def sunken(x: np.ndarray, y: np.ndarray, above: np.ndarray, share: float, cell: float) -> np.ndarray:
+    """Step of the ground of each cell [i, j] = [floor(y / cell), floor(x / cell)], by sorting the points of each."""
+    rows, columns = int(y.max() // cell) + 1, int(x.max() // cell) + 1
+    own = np.zeros((rows, columns))
+    for i in range(rows):
+        for j in range(columns):
+            inside = sorted(above[(y // cell == i) & (x // cell == j)])
+            if inside:
+                own[i, j] = min(0.0, inside[min(int(share * len(inside)), len(inside) - 1)])
+    return np.array(
+        [[own[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].min() for j in range(columns)] for i in range(rows)]
+    )
+
+
 def accumulated_distance(curve: np.ndarray, chord: int, closed: bool) -> np.ndarray:
     """CPDA by its definition, point by point and chord by chord."""
     n = len(curve)

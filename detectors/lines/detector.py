@@ -27,7 +27,7 @@ from .corners import find_corners
 from .duplicates import find_duplicates
 from .extension import Cover, Growth, extend_lines, last_step
 from .final import FinalRules, final_rectangles
-from .masks import build_masks, ground_heights, point_spacing
+from .masks import build_masks, ground_heights, point_spacing, sunken
 from .rasters import Rasters
 from .rectangles import INSIDE, initial_rectangles
 from .segments import Segments, beyond_coverage, fit_segments, inside_first
@@ -67,6 +67,12 @@ class LineDetector(Detector):
         doc="ground height: mean DEM of the tile, most frequent height of the tile's points, or DEM under the point",
         source="2010, 3.2; conference version, 3.1; 2011, 3.1",
     )
+    below_ground: float = parameter(
+        0.1, minimum=0, maximum=1, swept=(0.05, 0.1, 0.2, 1.0),
+        doc="largest share of the points around that may lie below the DEM under them before it is lowered "
+        "(`ground=point-dem`); 1 never lowers it, as printed",
+        source="2011, 3.1; reading",
+    )  # fmt: skip
     tile_size: float = parameter(
         450, unit="px of 0.15 m", minimum=20, swept=(400, 450, 500, 550, 600),
         doc="side of the tiles that a ground height is estimated for", source="2010, 3.2 and 4.4.1",
@@ -317,6 +323,8 @@ class LineDetector(Detector):
         ground = (
             ground_heights(points, scene.dem, method=self.ground, tile_side=tile_side) if len(points) else np.empty(0)
         )
+        if self.ground == "point-dem" and self.below_ground < 1 and len(points):
+            ground += sunken(points, ground, self.below_ground)
         masks = build_masks(
             points,
             ground + self.height,

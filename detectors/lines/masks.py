@@ -8,6 +8,9 @@ primary mask
     Black where no point below the threshold lies near: the void areas. Its black shapes are where buildings may be.
 secondary mask
     Black near points above the threshold: the filled areas. It bounds how far a building may be extended.
+sunken ground
+    Where the DEM runs above what the laser saw: a DEM is interpolated below buildings and crowns, and on a slope it
+    cuts through the pad that a house stands on.
 neighbourhood
     Side of the square that a point marks; it follows the point spacing (5 x 5 pixels of 0.15 m for points 0.5 m apart).
 nearest point
@@ -34,12 +37,14 @@ from numpy.typing import NDArray
 from ...scenes.points import PointCloud
 from ...scenes.raster import Elevation, Grid
 
-__all__ = ["Masks", "build_masks", "ground_heights", "point_spacing"]
+__all__ = ["Masks", "build_masks", "ground_heights", "point_spacing", "sunken"]
 
 #: Side of the cells in which points are counted to tell coverage and density, metres.
 _COVERAGE_CELL = 2.5
 #: A gap in the points narrower than this is a void inside the coverage, metres.
 _WIDEST_VOID = 50.0
+#: Side of the cells in which points below the ground are counted, metres: with their neighbours they span a house.
+_SUNKEN_CELL = 4.0
 #: Rows of the masks that are made at a time: distances take eight times the memory of a mask.
 _BAND = 512
 #: Distance between successive bins of the height histogram of a tile (conference version), metres.
@@ -160,6 +165,28 @@ def ground_heights(points: PointCloud, dem: Elevation | None, *, method: str, ti
     if not np.isfinite(dem.values).any():
         return np.full(len(points), np.nan)
     return _tile_dem(points, dem, tile_side) if method == "tile-dem" else _point_dem(points, dem)
+
+
+def sunken(points: PointCloud, ground: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    """Return by how much the ground is to be lowered at each point, metres, shape (n,): zero or less.
+
+    In cells of 4 m, no more than `share` of the points may lie below the ground: the ground of a cell sinks by the
+    most that it or one of its eight neighbours asks for, because a house hides the ground that it stands on. Between
+    the centres of cells the step is interpolated.
+    """
+    above = points.z - ground
+    known = np.isfinite(above)
+    if not known.any():
+        return np.zeros(len(points))
+    x, y = points.x[known], points.y[known]
+    grid = Grid.covering((x.min() - _SUNKEN_CELL, y.min() - _SUNKEN_CELL, x.max(), y.max()), _SUNKEN_CELL)
+    cell = grid.cells(x, y)[0]
+    ordered = above[known][np.lexsort((above[known], cell))]
+    count = np.bincount(cell, minlength=grid.rows * grid.columns)
+    place = np.cumsum(count) - count + np.floor(share * count).astype(np.int64)
+    low = np.where(count > 0, np.minimum(ordered[np.minimum(place, len(ordered) - 1)], 0.0), 0.0)
+    lowest = cv2.erode(low.astype(np.float32).reshape(grid.shape), np.ones((3, 3), np.uint8))
+    return Elevation(lowest, grid).sample(points.x, points.y)
 
 
 def _hits(points: PointCloud, chosen: NDArray[np.bool_], grid: Grid) -> NDArray[np.uint8]:

@@ -46,6 +46,7 @@ ABLATIONS = {
     "improved": (
         "marking=squares",
         "ground=tile-dem",
+        "below_ground=1",
         "entropy_threshold=0.3",
         "vegetation_side=inside",
         "adjustment=longest",

@@ -4,7 +4,7 @@ import naive_lines
 import numpy as np
 import pytest
 
-from roofbench.detectors.lines.masks import build_masks, ground_heights, point_spacing
+from roofbench.detectors.lines.masks import build_masks, ground_heights, point_spacing, sunken
 from roofbench.scenes.points import PointCloud
 from roofbench.scenes.raster import Elevation, Grid
 
@@ -128,3 +128,51 @@ def test_where_the_elevation_is_unknown_its_neighbourhood_stands_in():
     values[8:12, 8:12] = np.nan
     dem = Elevation(values, Grid(0.0, 20.0, 1.0, 20, 20))
     assert ground_heights(cloud([10], [10], [0]), dem, method="point-dem", tile_side=1.0) == pytest.approx([7.0])
+
+
+def house_on_a_pad(seed=3):
+    """A slope of 12 % with a level pad cut into it; a DEM that knows only the slope; points 1 m apart, and a house."""
+    rng = np.random.default_rng(seed)
+    column, row = np.mgrid[0:60, 0:60].reshape(2, -1)
+    x, y = np.array([column, row]) + rng.uniform(0.1, 0.9, (2, 3600))
+    slope = 0.12 * x
+    on_pad = (abs(x - 30) < 8) & (abs(y - 30) < 9)
+    earth = np.where(on_pad, 0.12 * 22, slope)
+    roof = (abs(x - 30) < 6) & (abs(y - 30) < 7)
+    return cloud(x, y, np.where(roof, earth + 3.2, earth) + rng.normal(0, 0.05, 3600)), slope, roof
+
+
+def test_the_ground_sinks_to_a_pad_that_the_elevation_cuts_through():
+    points, slope, roof = house_on_a_pad()
+    uphill = roof & (points.x > 31)
+    assert (points.z > slope + 2.5)[uphill].mean() < 0.2
+    ground = slope + sunken(points, slope, 0.1)
+    assert (points.z > ground + 2.5)[roof].mean() > 0.9
+    assert not (points.z > ground + 2.5)[~roof].any()
+    far = (abs(points.x - 30) > 20) | (abs(points.y - 30) > 20)
+    assert np.abs(ground - slope)[far].max() < 0.2
+
+
+def test_the_ground_never_rises_and_one_stray_point_does_not_lower_it():
+    points = house_on_a_pad()[0]
+    level = np.full(len(points), 3.0)
+    above = cloud(points.x, points.y, level + 1.0)
+    assert sunken(above, level, 0.1).tolist() == [0.0] * len(points)
+    stray = above.z.copy()
+    stray[1830] = -20.0
+    assert sunken(cloud(points.x, points.y, stray), level, 0.1).tolist() == [0.0] * len(points)
+    assert sunken(above, np.full(len(points), np.nan), 0.1).tolist() == [0.0] * len(points)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
+def test_no_more_than_the_share_of_the_points_of_a_cell_lie_below_the_sunken_ground(share):
+    rng = np.random.default_rng(12)
+    points = cloud(*rng.uniform(0, 40, (2, 3000)), rng.normal(0, 1, 3000))
+    step = naive_lines.sunken(points.x, points.y, points.z, share, cell=4.0)
+    centre = cloud(*(np.mgrid[0:9, 0:9].reshape(2, -1) * 4.0 + 4.0 - 2.0), np.zeros(81))
+    both = cloud(*(np.concatenate(pair) for pair in ((points.x, centre.x), (points.y, centre.y), (points.z, centre.z))))
+    ground = np.zeros(len(both))
+    ground[3000:] = np.nan
+    found = sunken(both, ground, share)[3000:]
+    for x, y, value in zip(centre.x, centre.y, found, strict=True):
+        assert value == pytest.approx(step[int(y // 4), int(x // 4)], abs=1e-5)
