@@ -89,6 +89,11 @@ class Improved(LineDetector):
     area_per_edge: float = parameter(
         4.5, unit="m", minimum=0, doc="least area per length of edges (test 6); 45 px of 0.1 m", source="2011, 3.4"
     )
+    peak_ratio: float = parameter(
+        2.0, minimum=0, swept=(1.0, 1.5, 2.0, 2.5),
+        doc="how many times as high as the mean a peak of tests 1 and 3 is; printed: well above it",
+        source="2011, 3.4; reading",
+    )  # fmt: skip
     new_share: float = parameter(
         0.0, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
         doc="least share of a final rectangle outside the larger ones against which it is turned; with less it is the "
@@ -181,4 +186,5 @@ class Improved(LineDetector):
             least=self.minimum_side,
             most_edges=self.most_edges,
             area_per_edge=self.area_per_edge,
+            peak_ratio=self.peak_ratio,
         )

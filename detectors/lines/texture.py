@@ -8,7 +8,7 @@ H_col
 H_ind
     The same of a single edge.
 peak
-    Circular local maximum above the mean bin.
+    Circular local maximum of a multiple of the mean bin: a significant peak is "well above the mean bin height".
 
 A candidate is a building when any test holds (L_min = 3 m): T1 two peaks of 3 L_min and less than 2 L_min on average in
 the bins between them; T2 a bin of 3 L_min and at most 90 m in all; T3 two peaks of 2 L_min and a highest bin of 3 times
@@ -149,13 +149,11 @@ def histograms_of(
     return collective * SAMPLE, strongest * SAMPLE
 
 
-def find_peaks(histogram: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the bins that are circular local maxima above the mean; of a plateau, its first bin."""
-    mean = histogram.mean()
+def find_peaks(histogram: NDArray[np.float64], ratio: float) -> NDArray[np.intp]:
+    """Return the circular local maxima that are higher than `ratio` times the mean; of a plateau, its first bin."""
     rising = histogram > np.roll(histogram, 1)
-    return np.asarray(
-        [k for k in np.flatnonzero(rising & (histogram > mean)) if _falls_after(histogram, int(k))], np.intp
-    )
+    high = np.flatnonzero(rising & (histogram > ratio * histogram.mean()))
+    return np.asarray([k for k in high if _falls_after(histogram, int(k))], np.intp)
 
 
 def _falls_after(histogram: NDArray[np.float64], k: int) -> bool:
@@ -174,6 +172,7 @@ def apply_tests(
     least: float,
     most_edges: float,
     area_per_edge: float,
+    peak_ratio: float,
 ) -> NDArray[np.bool_]:
     """Return which of the tests T1 to T6 each candidate passes, shape (k, 6).
 
@@ -189,6 +188,8 @@ def apply_tests(
         L_min and the most length of edges of T2 and T5, metres.
     area_per_edge : float
         Of T6, metres.
+    peak_ratio : float
+        How many times as high as the mean bin a peak of T1 and T3 is.
     """
     total, highest, mean = collective.sum(axis=1), collective.max(axis=1, initial=0.0), collective.mean(axis=1)
     passed = np.zeros((len(collective), 6), dtype=np.bool_)
@@ -197,7 +198,7 @@ def apply_tests(
     passed[:, 4] = (strongest >= least) & (total <= most_edges)
     passed[:, 5] = areas >= area_per_edge * total
     for i in np.flatnonzero(highest >= 2 * least):
-        peaks = find_peaks(collective[i])
+        peaks = find_peaks(collective[i], peak_ratio)
         heights = collective[i, peaks]
         passed[i, 2] = (heights >= 2 * least).sum() >= 2 and highest[i] >= 3 * mean[i]
         high = peaks[heights >= 3 * least]
@@ -217,6 +218,7 @@ def judge(
     least: float,
     most_edges: float,
     area_per_edge: float,
+    peak_ratio: float,
 ) -> Texture:
     """Return the histograms and tests of candidate rectangles; see `apply_tests` for the limits.
 
@@ -226,5 +228,13 @@ def judge(
     wide = boxes + np.array([0, 0, 0, 0, -1, 1, -1, 1]) * margin / gsd
     collective, strongest = histograms_of(wide, edges.curves, edges.points, shape)
     areas = lengths(wide) * widths(wide) * gsd**2
-    limits = {"least": least, "most_edges": most_edges, "area_per_edge": area_per_edge}
-    return Texture(edges, collective, strongest, apply_tests(collective, strongest, areas, **limits))
+    passed = apply_tests(
+        collective,
+        strongest,
+        areas,
+        least=least,
+        most_edges=most_edges,
+        area_per_edge=area_per_edge,
+        peak_ratio=peak_ratio,
+    )
+    return Texture(edges, collective, strongest, passed)

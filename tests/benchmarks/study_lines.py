@@ -58,6 +58,7 @@ ABLATIONS = {
         "texture=false,voting=false",
         "texture_margin=0",
         "edge_contrast=0",
+        "peak_ratio=1",
         "missed_corner=1000",
         "curve_step=0.15",
         "extension_part=1000",

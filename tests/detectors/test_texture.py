@@ -137,17 +137,37 @@ def bins(**heights):
     return histogram
 
 
-def passed(histogram, *, strongest=0.0, area=1.0):
+def passed(histogram, *, strongest=0.0, area=1.0, peak_ratio=1.0):
     found = apply_tests(
-        histogram[None], np.array([strongest]), np.array([area]), least=3.0, most_edges=90.0, area_per_edge=4.5
-    )
+        histogram[None], np.array([strongest]), np.array([area]),
+        least=3.0, most_edges=90.0, area_per_edge=4.5, peak_ratio=peak_ratio,
+    )  # fmt: skip
     return [number + 1 for number in np.flatnonzero(found[0])]
 
 
 def test_peaks_are_circular_maxima_above_the_mean():
-    assert find_peaks(bins(b0=5, b17=4, b18=4, b34=4)).tolist() == [0, 17]
-    assert find_peaks(bins(b34=5, b0=4)).tolist() == [34]
-    assert find_peaks(np.ones(BIN_COUNT)).tolist() == []
+    assert find_peaks(bins(b0=5, b17=4, b18=4, b34=4), 1.0).tolist() == [0, 17]
+    assert find_peaks(bins(b34=5, b0=4), 1.0).tolist() == [34]
+    assert find_peaks(np.ones(BIN_COUNT), 1.0).tolist() == []
+
+
+def test_a_peak_stands_out_as_many_times_as_asked():
+    histogram = np.full(BIN_COUNT, 1.0)
+    histogram[5], histogram[20] = 2.2, 3.0
+    assert find_peaks(histogram, 1.0).tolist() == [5, 20]
+    assert find_peaks(histogram, 2.2).tolist() == [20]
+    assert find_peaks(histogram, 3.0).tolist() == []
+
+
+def test_the_highest_bins_of_a_wood_are_no_peaks_of_twice_the_mean():
+    """180 m of edges in all directions: two bins reach the 9 m that test 1 asks for, with less than 6 m between."""
+    wood = np.full(BIN_COUNT, 4.9)
+    wood[5], wood[23] = 9.0, 9.5
+    assert passed(wood, peak_ratio=1.0) == [1]
+    assert passed(wood, peak_ratio=2.0) == []
+    house = np.full(BIN_COUNT, 3.0)
+    house[5], house[23] = 9.0, 9.5
+    assert 1 in passed(house, peak_ratio=2.0)
 
 
 def test_t1_two_high_peaks_with_little_between():
