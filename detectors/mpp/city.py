@@ -15,6 +15,7 @@ from .polish import polish
 from .preparation import Prepared
 from .random_stream import stream
 from .rectangles import corners
+from .strips import take_in_strips
 from .tiles import Tile, tiles_of, work_off
 from .walls import close_walls
 from .workers import Workers
@@ -28,7 +29,7 @@ _Rectangles = NDArray[np.float64]
 
 
 def sample_city(parameters: MPP, prepared: Prepared, seed: int, workers: Workers) -> tuple[_Rectangles, list[Annealed]]:
-    """Anneal every tile, then polish the seams and close the walls."""
+    """Anneal every tile, then polish the seams, close the walls and take in what is no building by itself."""
     grid, model, tables = prepared.grid, prepared.model, prepared.tables
     size = max(parameters.tile, 2.0 * parameters.largest_side)
     reach = math.sqrt(2.0) * model.largest_side
@@ -64,6 +65,7 @@ def sample_city(parameters: MPP, prepared: Prepared, seed: int, workers: Workers
         rectangles = work_off(tiles_of(grid, size, shifted=True), rectangles, mended, reach=reach, workers=workers)
     rectangles = np.ascontiguousarray(rectangles[np.lexsort(rectangles.T)])
     close_walls(tables.small, tables.large, model, rectangles, 0.25 * parameters.price)
+    rectangles = take_in_strips(tables, model, rectangles, slender=parameters.slender, part_share=parameters.part_share)
     return rectangles, [results[key] for key in sorted(results)]
 
 

@@ -60,6 +60,19 @@ class MPP(Detector):
     )
     least_side: float = parameter(2.0, unit="m", minimum=0.5, doc="shortest side of a building", swept=(2.0, 3.0))
     largest_side: float = parameter(120.0, unit="m", minimum=5, doc="longest side of a building")
+    slender: float = parameter(
+        3.0,
+        minimum=1,
+        doc="ratio of the sides above which a rectangle along a larger one is a part of it",
+        swept=(2.5, 3.0, 4.0, 1000.0),
+    )
+    part_share: float = parameter(
+        0.1,
+        minimum=0,
+        maximum=1,
+        doc="share of the area of a larger rectangle below which one along it is a part of it",
+        swept=(0, 0.05, 0.1, 0.2),
+    )
     price: float = parameter(
         20.0, minimum=0, doc="energy of a rectangle (gamma): what its evidence must exceed", swept=(10, 20, 40)
     )

@@ -14,7 +14,7 @@ from numba import njit
 
 from .energy import energy_below, least_energy, overlaps, own_energy
 
-__all__ = ["polish"]
+__all__ = ["hull", "polish"]
 
 #: Least gain of energy that counts, so that rounding cannot make the search run in circles.
 _GAIN = 1e-6
@@ -154,7 +154,7 @@ def _split(small, large, model, window, rectangles, own, count, fixed, i):  # ty
 
 
 @njit(cache=True, nogil=True)
-def _hull(first, second, merged):  # type: ignore[no-untyped-def]
+def hull(first, second, merged):  # type: ignore[no-untyped-def]
     """Fill the rectangle at the angle of the first that holds both."""
     cos, sin = math.cos(first[4]), math.sin(first[4])
     dx, dy = second[0] - first[0], second[1] - first[1]
@@ -183,7 +183,7 @@ def _merge(small, large, model, window, rectangles, own, count, fixed, i):  # ty
         touch = 0.5 * (math.hypot(rectangles[i, 2], rectangles[i, 3]) + math.hypot(rectangles[j, 2], rectangles[j, 3]))
         if dx * dx + dy * dy > (touch + 2.0) ** 2:
             continue
-        _hull(rectangles[i], rectangles[j], merged)
+        hull(rectangles[i], rectangles[j], merged)
         filled = rectangles[i, 2] * rectangles[i, 3] + rectangles[j, 2] * rectangles[j, 3]
         # A hull much larger than its parts covers what neither wanted.
         if merged[2] * merged[3] > 1.6 * filled or not _allowed(merged, window, model):
@@ -264,7 +264,7 @@ def _joined(first, second, axis, joined):  # type: ignore[no-untyped-def]
     The edges across the axis are means of those of the two, weighted with their lengths: where parts of one roof are a
     cell out of line, their hull would take in a row of cells that neither wanted.
     """
-    _hull(first, second, joined)
+    hull(first, second, joined)
     cos, sin = math.cos(first[4]), math.sin(first[4])
     dx, dy = second[0] - first[0], second[1] - first[1]
     across = dx * cos + dy * sin if axis == 1 else dy * cos - dx * sin

@@ -1,0 +1,86 @@
+"""Strips: what lies along a much larger building, or is slender and lies along a larger one, is a part of it.
+
+Nouns
+-----
+strip
+    A rectangle whose long side lies, to `_ALONG` of its length, against a larger rectangle, and that is more than
+    `slender` times as long as wide or has less than `part_share` of the area of the larger one: the eaves of a roof of
+    two levels, a canopy along a wall, the rest of a wing beside a penthouse. A house in a row is none.
+
+A strip is taken into the building that it lies against where the larger rectangle has less energy than that building by
+itself, and left out otherwise. So the sampled energy may rise: that no building is a strip is a rule of what a building
+is, like its least side, but one that needs the neighbours to be known.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from .energy import Model, overlaps, own_energy
+from .polish import hull
+from .rectangles import corners
+from .tables import Tables
+
+__all__ = ["take_in_strips"]
+
+#: Share of a strip's long side that lies against the building, and cells that may lie between.
+_ALONG, _APART = 0.65, 1.5
+
+
+def take_in_strips(
+    tables: Tables, model: Model, rectangles: NDArray[np.float64], *, slender: float, part_share: float
+) -> NDArray[np.float64]:
+    """Return the rectangles, shape (m, 5), after strips were taken in or left out, the smallest first.
+
+    Parameters
+    ----------
+    tables : Tables
+    model : Model
+    rectangles : ndarray, shape (n, 5)
+        Grid frame.
+    slender : float
+        Ratio of the sides above which a rectangle along a larger one is a strip.
+    part_share : float
+        Share of the area of the larger one below which it is a strip whatever its sides are.
+    """
+    result = rectangles.copy()
+    kept = np.ones(len(result), dtype=np.bool_)
+    areas = result[:, 2:4].prod(axis=1)
+    tree = shapely.STRtree(shapely.polygons(corners(result)))
+    for strip in np.argsort(areas, kind="stable"):
+        short, long = sorted(result[strip, 2:4])
+        near = tree.query(shapely.polygons(corners(result[strip]))[0], predicate="dwithin", distance=_APART)
+        near = near[kept[near] & (areas[near] > areas[strip])]
+        larger = near[(long > slender * short) | (areas[strip] < part_share * areas[near])]
+        if len(larger) == 0:
+            continue
+        along = _along(result[strip], result[larger])
+        if along.max() < _ALONG:
+            continue
+        building = larger[np.argmax(along)]
+        kept[strip] = False
+        joined = np.empty(5)
+        hull(result[building], result[strip], joined)
+        if joined[2:4].max() > model.largest_side:
+            continue
+        others = result[kept & (np.arange(len(result)) != building)]
+        before, after = (
+            own_energy(tables.small, tables.large, one, model)
+            + model.overlap * overlaps(others, len(others), one, -1, -1)
+            for one in (result[building], joined)
+        )
+        if after < before:
+            result[building], areas[building] = joined, joined[2:4].prod()
+    return result[kept]
+
+
+def _along(strip: NDArray[np.float64], buildings: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the share of the strip's better long side that lies against each building, shape (n,)."""
+    place = corners(strip)[0]
+    first = 0 if strip[2] >= strip[3] else 1
+    long_sides = shapely.linestrings([place[[first, first + 1]], place[[first + 2, (first + 3) % 4]]])
+    around = shapely.buffer(shapely.polygons(corners(buildings)), _APART, join_style="mitre")
+    shares = shapely.length(shapely.intersection(long_sides[:, None], around)) / shapely.length(long_sides)[:, None]
+    return shares.max(axis=0)  # type: ignore[no-any-return]
