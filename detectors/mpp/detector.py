@@ -23,7 +23,7 @@ from ..base import Detector, Step
 from .city import join_traces, sample_city, total_energy
 from .energy import own_energies
 from .figures import draw_convergence, draw_evidence, draw_heights, draw_rectangles
-from .outcome import as_blocks, as_rectangles
+from .outcome import as_blocks, as_buildings
 from .preparation import Prepared, prepare
 from .printed import sample_printed
 from .workers import some_workers
@@ -95,7 +95,9 @@ class MPP(Detector):
         swept=(0, 0.005, 0.01),
     )
     outline: str = parameter(
-        "rectangles", choices=("rectangles", "blocks"), doc="one rectangle a house or wing, or one polygon a block"
+        "buildings",
+        choices=("buildings", "rectangles", "blocks"),
+        doc="one outline a house or wing, a rectangle where one describes it; rectangles alone; or one polygon a block",
     )
     roofs: str = parameter("all", choices=("all", "flat"), doc="plane, gable and hip roofs besides flat ones, or not")
     roof_step: float = parameter(
@@ -211,5 +213,14 @@ class MPP(Detector):
         if self.outline == "blocks":
             found = as_blocks(prepared, rectangles, crs=scene.crs, record=record, source=self.name)
         else:
-            found = as_rectangles(prepared, rectangles, energies, crs=scene.crs, record=record, source=self.name)
+            found = as_buildings(
+                prepared,
+                rectangles,
+                energies,
+                # The printed algorithm ends with its rectangles.
+                follow_cells=self.outline == "buildings" and self.mode == "reversible",
+                crs=scene.crs,
+                record=record,
+                source=self.name,
+            )
         return found, prepared, rectangles

@@ -1,4 +1,4 @@
-"""The result of a run as footprints: a rectangle each, or blocks of all that is built together."""
+"""The result of a run as footprints: a rectangle or an outline each, or blocks of all that is built together."""
 
 from __future__ import annotations
 
@@ -6,28 +6,35 @@ import math
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from ...scenes.footprints import Footprints
 from .blocks import outline_blocks
+from .buildings import outline_buildings
 from .energy import ground_variance
 from .preparation import Prepared
 from .rectangles import to_world
 from .roofs import KINDS, fit_roof
 
-__all__ = ["as_blocks", "as_rectangles"]
+__all__ = ["as_blocks", "as_buildings"]
 
 
-def as_rectangles(
+def as_buildings(
     prepared: Prepared,
     rectangles: NDArray[np.float64],
     energies: NDArray[np.float64],
     *,
+    follow_cells: bool,
     crs: str | None,
     record: dict[str, Any],
     source: str,
 ) -> Footprints:
-    """Return one footprint a rectangle, with the attributes height, tau, slope (m, m, m/m), roof and energy."""
+    """Return one footprint a rectangle, with the attributes height, tau, slope (m, m, m/m), roof and energy.
+
+    Footprints are the rectangles, or where `follow_cells` is set and a rectangle is no good outline, its part of the
+    block (`buildings`).
+    """
     tables, model = prepared.tables, prepared.model
     share = model.weight * model.fit_weight
     price = model.roof_price / share if share > 0 else math.inf
@@ -45,8 +52,12 @@ def as_rectangles(
             model.cell,
             fit,
         )
-    return Footprints.from_rectangles(
-        to_world(rectangles, prepared.grid),
+    if follow_cells:
+        outlines = outline_buildings(rectangles, _blocks(prepared, rectangles), prepared.grid)
+    else:
+        outlines = shapely.polygons(to_world(rectangles, prepared.grid))
+    return Footprints.of(
+        outlines,
         crs=crs,
         attributes={
             "height": fits[:, 1],
@@ -64,5 +75,8 @@ def as_blocks(
     prepared: Prepared, rectangles: NDArray[np.float64], *, crs: str | None, record: dict[str, Any], source: str
 ) -> Footprints:
     """Return one footprint a block that the rectangles belong to, outlined along its cells (`blocks`)."""
-    polygons = outline_blocks(rectangles, prepared.grid, prepared.state, prepared.score)
-    return Footprints.of(polygons, crs=crs, metadata=record, source=source)
+    return Footprints.of(_blocks(prepared, rectangles), crs=crs, metadata=record, source=source)
+
+
+def _blocks(prepared: Prepared, rectangles: NDArray[np.float64]) -> NDArray[np.object_]:
+    return outline_blocks(rectangles, prepared.grid, prepared.state, prepared.score)

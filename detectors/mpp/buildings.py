@@ -1,0 +1,101 @@
+"""Buildings: each rectangle's part of the block that it stands in; cells say how far, rectangles where one ends.
+
+Nouns
+-----
+nearness
+    Of a place to a rectangle: its distance in cells, inside the negative distance from the nearest side.
+zone
+    Where a rectangle is nearer than all others, and not far. Two that touch meet in their common wall and in the line
+    that goes on from it.
+
+A building is the common area of its zone and its block, or the whole block of which it is the only one, where the
+rectangle does not describe that as well.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...scenes.raster import Grid
+from ..outlines import trace
+from .rectangles import corners, to_world
+
+__all__ = ["outline_buildings"]
+
+#: Common area over joint area from which the rectangle is as good an outline.
+_AS_GOOD = 0.95
+#: Metres: how far a zone reaches from its rectangle, and by how much vertices of an outline may move.
+_REACH, _STRAIGHT = 10.0, 0.05
+#: Square metres: smallest part of a building that is cut off from the rest of it.
+_SCRAP = 4.0
+
+
+def outline_buildings(rectangles: NDArray[np.float64], blocks: NDArray[np.object_], grid: Grid) -> NDArray[np.object_]:
+    """Return one outline a rectangle, shape (n,), polygons or multipolygons in metres of the CRS.
+
+    Parameters
+    ----------
+    rectangles : ndarray, shape (n, 5)
+        Grid frame.
+    blocks : ndarray of shapely Polygons
+        As `blocks.outline_blocks` returns them.
+    grid : Grid
+    """
+    outlines: NDArray[np.object_] = shapely.polygons(to_world(rectangles, grid))
+    if len(rectangles) == 0 or len(blocks) == 0:
+        return outlines
+    one, block = shapely.STRtree(blocks).query(outlines, predicate="intersects")
+    common = shapely.area(shapely.intersection(outlines[one], blocks[block]))
+    # Each rectangle belongs to the block that holds most of it.
+    order = np.lexsort((-common, one))
+    one, block = one[order], block[order]
+    first = np.unique(one, return_index=True)[1]
+    one, block = one[first], block[first]
+    tree = shapely.STRtree(outlines)
+    result = outlines.copy()
+    alone = np.bincount(block, minlength=len(blocks)) == 1
+    for k, of in zip(one, block, strict=True):
+        part = blocks[of]
+        if not alone[of]:
+            rivals = tree.query(outlines[k], predicate="dwithin", distance=2 * _REACH)
+            part = _part(rectangles[k], rectangles[rivals[rivals != k]], part, grid)
+        together = shapely.area(shapely.union(part, outlines[k]))
+        if shapely.area(shapely.intersection(part, outlines[k])) < _AS_GOOD * together:
+            result[k] = part
+    return result
+
+
+def _part(rectangle: NDArray[np.float64], rivals: NDArray[np.float64], block: Any, grid: Grid) -> Any:
+    """Return the common area of a block and the zone of a rectangle, which reaches to its rivals, shape (m, 5)."""
+    place = corners(rectangle)[0]
+    reach = _REACH / grid.gsd
+    left, top = np.floor(place.min(axis=0) - reach).astype(int) - 1
+    right, bottom = np.ceil(place.max(axis=0) + reach).astype(int) + 1
+    west, north = grid.to_world(top, left)
+    window = Grid(float(west), float(north), grid.gsd, int(bottom - top), int(right - left))
+    x, y = np.meshgrid(np.arange(left, right) + 0.5, np.arange(top, bottom) + 0.5)
+    own = _nearness(rectangle, x, y)
+    lead = reach - own
+    for rival in rivals:
+        np.minimum(lead, _nearness(rival, x, y) - own, out=lead)
+    # Where the lead is more than nothing, the "coverage" is more than one half.
+    zone = shapely.union_all(trace(lead + 0.5, window))
+    parts = shapely.get_parts(shapely.intersection(zone, block))
+    parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
+    if len(parts) == 0:
+        return shapely.Polygon()
+    sizes = shapely.area(parts)
+    return shapely.simplify(shapely.union_all(parts[(sizes >= _SCRAP) | (sizes == sizes.max())]), _STRAIGHT)
+
+
+def _nearness(rectangle: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    cos, sin = np.cos(rectangle[4]), np.sin(rectangle[4])
+    dx, dy = x - rectangle[0], y - rectangle[1]
+    u = np.abs(dx * cos + dy * sin) - 0.5 * rectangle[2]
+    v = np.abs(dy * cos - dx * sin) - 0.5 * rectangle[3]
+    nearness: NDArray[np.float64] = np.hypot(np.maximum(u, 0), np.maximum(v, 0)) + np.minimum(np.maximum(u, v), 0)
+    return nearness

@@ -1,0 +1,61 @@
+"""A building is its rectangle's part of the block, or the rectangle where that is as good."""
+
+import numpy as np
+import pytest
+import shapely
+
+from roofbench.detectors.mpp.buildings import outline_buildings
+from roofbench.scenes.raster import Grid
+
+GRID = Grid(1000.0, 2000.0, 0.5, 200, 200)
+
+
+def world(*boxes):
+    """Polygons from boxes in cells (left, top, right, bottom), y downwards."""
+    return shapely.union_all(
+        [shapely.box(1000 + x0 / 2, 2000 - y1 / 2, 1000 + x1 / 2, 2000 - y0 / 2) for x0, y0, x1, y1 in boxes]
+    )
+
+
+def agreement(first, second):
+    return first.intersection(second).area / first.union(second).area
+
+
+def test_a_rectangle_that_describes_its_block_stays_and_one_that_does_not_becomes_the_block():
+    rectangles = np.array([[30.0, 30.0, 40.0, 20.0, 0.0], [130.0, 30.0, 40.0, 40.0, 0.0]])
+    blocks = np.array([world((10, 20, 51, 40)), world((110, 10, 150, 50), (120, 50, 150, 65))])
+    first, second = outline_buildings(rectangles, blocks, GRID)
+    assert first.equals(world((10, 20, 50, 40)))
+    assert second.equals(blocks[1])
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_houses_of_a_block_meet_in_their_party_wall_and_have_all_of_it(angle):
+    # Three houses in a row, and cells of the block two metres beyond their backs.
+    cos, sin = np.cos(angle), np.sin(angle)
+    place = np.array([[-16.0, 0.0], [0.0, 0.0], [16.0, 0.0]]) @ np.array([[cos, sin], [-sin, cos]]) + 100.0
+    rectangles = np.column_stack([place, np.full(3, 16.0), np.full(3, 24.0), np.full(3, angle)])
+    block = world((76, 88, 124, 116))
+    block = shapely.affinity.rotate(block, -np.degrees(angle), origin=(1050.0, 1950.0))
+    parts = outline_buildings(rectangles, np.array([block]), GRID)
+    assert agreement(shapely.union_all(parts), block) > 0.995
+    for k, part in enumerate(parts):
+        assert part.area == pytest.approx(8.0 * 14.0, rel=0.02)
+        assert part.intersection(shapely.union_all(np.delete(parts, k))).area < 0.5
+
+
+def test_a_courtyard_stays_open_and_what_is_far_from_all_rectangles_belongs_to_none():
+    rectangles = np.array([[40.0, 50.0, 20.0, 60.0, 0.0], [90.0, 50.0, 20.0, 60.0, 0.0]])
+    block = world((30, 20, 100, 80)).difference(world((55, 35, 75, 65)))
+    far = block.union(world((100, 45, 190, 55)))
+    left, right = outline_buildings(rectangles, np.array([far]), GRID)
+    assert left.intersection(world((55, 35, 75, 65))).area == 0
+    assert agreement(left.union(right).intersection(block), block) > 0.99
+    assert right.bounds[2] == pytest.approx(1050 + 10, abs=0.3)
+
+
+def test_rectangles_without_a_block_and_scenes_without_anything():
+    alone = np.array([[30.0, 30.0, 40.0, 20.0, 0.0]])
+    assert outline_buildings(alone, np.empty(0, object), GRID)[0].equals(world((10, 20, 50, 40)))
+    assert outline_buildings(alone, np.array([world((100, 100, 120, 120))]), GRID)[0].equals(world((10, 20, 50, 40)))
+    assert len(outline_buildings(np.empty((0, 5)), np.array([world((0, 0, 9, 9))]), GRID)) == 0
