@@ -83,7 +83,7 @@ def _part(rectangle: NDArray[np.float64], rivals: NDArray[np.float64], block: An
     for rival in rivals:
         np.minimum(lead, _nearness(rival, x, y) - own, out=lead)
     # Where the lead is more than nothing, the "coverage" is more than one half.
-    zone = shapely.union_all(trace(lead + 0.5, window))
+    zone = shapely.union_all(trace((lead + 0.5).astype(np.float32), window))
     parts = shapely.get_parts(shapely.intersection(zone, block))
     parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
     if len(parts) == 0:
