@@ -91,6 +91,7 @@ def anneal(
     window: tuple[float, float, float, float],
     boxes: _Rectangles,
     weights: NDArray[np.float64],
+    energies: NDArray[np.float64],
     own: _Rectangles,
     fixed: _Rectangles,
     state: NDArray[np.uint64],
@@ -106,8 +107,8 @@ def anneal(
         Where centres may lie, cells.
     boxes : ndarray, shape (n, 5)
         Centred in the window, best first.
-    weights : ndarray, shape (n,)
-        Of their birth kernels.
+    weights, energies : ndarray, shape (n,)
+        Of their birth kernels, and of the boxes by themselves.
     own, fixed : ndarray, shape (k, 5), (m, 5)
         Start, and buildings of other windows.
     state : ndarray of uint64
@@ -122,7 +123,7 @@ def anneal(
         return float(configuration_energy(small, large, rectangles, len(rectangles), fixed, model))
 
     def polished(rectangles: _Rectangles) -> _Rectangles:
-        best, _ = polish(small, large, model, edges, rectangles, fixed, boxes, capacity, schedule.sweeps)
+        best, _ = polish(small, large, model, edges, rectangles, fixed, boxes, energies, capacity, schedule.sweeps)
         return best  # type: ignore[no-any-return]
 
     first = polished(own) if schedule.greedy else own
@@ -151,6 +152,6 @@ def anneal(
     ends = [polished(chain)]
     if chain_energy >= start - 1e-9 and schedule.greedy:
         ends.append(first)
-    energies = [energy(end) for end in ends]
-    best = int(np.argmin(energies))
-    return Annealed(ends[best], trace, start, float(chain_energy), energies[best])
+    finals = [energy(end) for end in ends]
+    best = int(np.argmin(finals))
+    return Annealed(ends[best], trace, start, float(chain_energy), finals[best])

@@ -62,7 +62,11 @@ def propose_boxes(
         boxes += _boxes_of_patches(labels, count, finer, least_cells, workers)
         finer = labels
     together = np.concatenate(boxes)
-    return together[np.sort(np.unique(np.round(together, 3), axis=0, return_index=True)[1])]
+    rounded = np.round(together, 3)
+    order = np.lexsort(rounded.T)
+    first = np.ones(len(order), dtype=np.bool_)
+    first[1:] = (rounded[order[1:]] != rounded[order[:-1]]).any(axis=1)
+    return together[np.sort(order[first])]
 
 
 def _boxes_of_patches(

@@ -131,7 +131,8 @@ def make_cells(
         _add_tops(*cloud, elevation, place, frame, first, last, grid.columns, counts, tops)
         _summarise(counts, tops, first, last, height, state, openness)
 
-    workers.bands(work, grid.rows)
+    # Every band goes through all points: no more bands than threads.
+    workers.bands(work, grid.rows, each=1)
     workers.bands(lambda first, last: _despike(height, state, first, last, other), grid.rows)
     workers.bands(lambda first, last: _fill(height, openness, other, first, last, state), grid.rows)
     workers.bands(lambda first, last: _fill(height, openness, state, first, last, other), grid.rows)

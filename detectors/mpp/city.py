@@ -43,6 +43,7 @@ def sample_city(parameters: MPP, prepared: Prepared, seed: int, workers: Workers
             tile.window,
             prepared.boxes[inside],
             prepared.weights[inside],
+            prepared.energies[inside],
             own,
             _within_reach(fixed, tile, model.largest_side),
             stream([seed, tile.column % 2**32, tile.row % 2**32]),
@@ -52,11 +53,12 @@ def sample_city(parameters: MPP, prepared: Prepared, seed: int, workers: Workers
         return result.rectangles
 
     def mended(tile: Tile, own: _Rectangles, fixed: _Rectangles) -> _Rectangles:
-        boxes = prepared.boxes[tile.owns(prepared.boxes)]
+        inside = tile.owns(prepared.boxes)
+        boxes, energies = prepared.boxes[inside], prepared.energies[inside]
         fixed = _within_reach(fixed, tile, model.largest_side)
         window = np.array(tile.window)
         sweeps = min(parameters.sweeps, 4)
-        best, _ = polish(tables.small, tables.large, model, window, own, fixed, boxes, len(own) + 64, sweeps)
+        best, _ = polish(tables.small, tables.large, model, window, own, fixed, boxes, energies, len(own) + 64, sweeps)
         return best  # type: ignore[no-any-return]
 
     tiles = tiles_of(grid, size)

@@ -23,13 +23,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import shapely
 from numba import njit
 from numpy.typing import NDArray
 
 from .cells import HIGH, LOW, VOID
 from .patches import patch_sizes
-from .rectangles import corners, overlap_area, row_span
+from .rectangles import overlap_area, row_span
 from .workers import ALONE, Workers
 
 __all__ = ["lower_storeys"]
@@ -40,6 +39,8 @@ _BORDER = 2.0
 _GROWTH = 6
 #: How far beyond its sides a box may look, cells.
 _REACH = 0.5 * _GROWTH + 2.0
+#: Side of the squares by which boxes near each other are found, cells.
+_SQUARE = 16
 #: Share of a side's known cells that must lie at the base, share of a box that may lie lower, and share that must have
 #: the texture of a roof.
 _LEVEL, _LOWER, _SMOOTH = 0.6, 0.2, 0.8
@@ -79,7 +80,7 @@ def lower_storeys(
     workers : Workers
     """
     sizes = patch_sizes(labels, count, workers=workers)
-    wave = np.zeros(len(boxes), dtype=np.int64) if workers.count == 1 else _waves(boxes)
+    wave = np.zeros(len(boxes), dtype=np.int64) if workers.count == 1 else _waves(boxes, *height.shape)
     for turn in range(wave.max(initial=-1) + 1):
         batch = boxes[wave == turn]
 
@@ -89,24 +90,43 @@ def lower_storeys(
         workers.map(work, workers.ranges(batch[:, 2] * batch[:, 3], each=2))
 
 
-def _waves(boxes: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the wave of each box: the first after those of all boxes before it that it may share a cell with."""
-    grown = boxes + np.array([0.0, 0.0, 2 * _REACH, 2 * _REACH, 0.0])
-    place = corners(grown)
-    bounds = shapely.box(*place.min(axis=1).T, *place.max(axis=1).T)
-    later, before = shapely.STRtree(bounds).query(bounds)
-    order = np.argsort(later, kind="stable")
-    return _count_waves(grown, later[order], before[order])  # type: ignore[no-any-return]
-
-
 @njit(cache=True, nogil=True)
-def _count_waves(boxes, later, before):  # type: ignore[no-untyped-def]
+def _waves(boxes, rows, columns):  # type: ignore[no-untyped-def]
+    """Return the wave of each box: the first after those of all boxes before it that it may share a cell with."""
     wave = np.zeros(len(boxes), dtype=np.int64)
-    for pair in range(len(later)):
-        i, j = later[pair], before[pair]
-        if j < i and wave[i] <= wave[j] and overlap_area(boxes[i], boxes[j]) > 0.0:
-            wave[i] = wave[j] + 1
+    grown = boxes.copy()
+    grown[:, 2:4] += 2 * _REACH
+    # The boxes before that meet a square of the grid are linked, the last one first.
+    last = np.full((rows // _SQUARE + 1, columns // _SQUARE + 1), -1, dtype=np.int64)
+    links, size = np.empty((4 * len(boxes) + 64, 2), dtype=np.int64), 0
+    for k in range(len(boxes)):
+        cos, sin = abs(math.cos(grown[k, 4])), abs(math.sin(grown[k, 4]))
+        wide = 0.5 * (grown[k, 2] * cos + grown[k, 3] * sin)
+        tall = 0.5 * (grown[k, 2] * sin + grown[k, 3] * cos)
+        left, right = _square(grown[k, 0] - wide, columns), _square(grown[k, 0] + wide, columns) + 1
+        top, bottom = _square(grown[k, 1] - tall, rows), _square(grown[k, 1] + tall, rows) + 1
+        for r in range(top, bottom):
+            for c in range(left, right):
+                link = last[r, c]
+                while link >= 0:
+                    other = links[link, 0]
+                    if wave[other] >= wave[k] and overlap_area(grown[k], grown[other]) > 0.0:
+                        wave[k] = wave[other] + 1
+                    link = links[link, 1]
+        while size + (bottom - top) * (right - left) > len(links):
+            links = np.concatenate((links, np.empty_like(links)))
+        for r in range(top, bottom):
+            for c in range(left, right):
+                links[size, 0], links[size, 1] = k, last[r, c]
+                last[r, c] = size
+                size += 1
     return wave
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _square(place, size):  # type: ignore[no-untyped-def]
+    """Return the square of the grid along one axis that a place lies in, the nearest one outside."""
+    return int(min(max(place, 0.0), size - 1.0)) // _SQUARE
 
 
 @njit(cache=True, nogil=True)

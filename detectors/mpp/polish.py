@@ -335,7 +335,7 @@ def _absorb(small, large, model, window, rectangles, own, fresh, count, fixed, i
 
 
 @njit(cache=True, nogil=True)
-def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps):  # type: ignore[no-untyped-def]
+def polish(small, large, model, window, start, fixed, boxes, energies, capacity, sweeps):  # type: ignore[no-untyped-def]
     """Lower the energy of a state until a sweep changes nothing or `sweeps` are done.
 
     Parameters
@@ -347,6 +347,8 @@ def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps): 
     start, fixed : ndarray, shape (n, 5), (m, 5)
     boxes : ndarray, shape (l, 5)
         Births to try.
+    energies : ndarray, shape (l,)
+        Of the boxes by themselves.
     capacity, sweeps : int
 
     Returns
@@ -363,7 +365,7 @@ def polish(small, large, model, window, start, fixed, boxes, capacity, sweeps): 
     alones = np.full(len(boxes), np.inf)
     for j in range(len(boxes)):
         if _allowed(boxes[j], window, model):
-            alones[j] = energy_below(small, large, boxes[j], model, -_GAIN)
+            alones[j] = energies[j]
     spare = np.empty_like(rectangles), np.empty_like(own), np.empty_like(fresh)
     gained = 0.0
     for sweep in range(sweeps):

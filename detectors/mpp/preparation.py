@@ -52,7 +52,8 @@ class Prepared:
     model : Model
     boxes : ndarray, shape (n, 5)
         Best first.
-    weights : ndarray, shape (n,)
+    weights, energies : ndarray, shape (n,)
+        Of the birth kernel of each box, and of the box by itself.
     """
 
     grid: Grid
@@ -64,6 +65,7 @@ class Prepared:
     model: Model
     boxes: NDArray[np.float64]
     weights: NDArray[np.float64]
+    energies: NDArray[np.float64]
 
 
 def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers) -> Prepared:
@@ -88,9 +90,10 @@ def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers)
     parts = workers.bands(lambda first, last: own_energies(*sums, boxes[first:last], model), len(boxes))
     energies = np.concatenate([np.empty(0), *parts])
     order = np.argsort(energies, kind="stable")
-    boxes, weights = boxes[order], np.sqrt(np.maximum(-energies[order], 1.0))
+    boxes, energies = boxes[order], energies[order]
+    weights = np.sqrt(np.maximum(-energies, 1.0))
     grid = Grid.covering(scene.extent, cell)
-    return Prepared(grid, kept, state, score, background, tables, model, boxes, weights)
+    return Prepared(grid, kept, state, score, background, tables, model, boxes, weights, energies)
 
 
 def _shortened(height: NDArray[np.int32], workers: Workers) -> NDArray[np.uint16]:

@@ -40,9 +40,13 @@ class Workers:
         """Return the results of all jobs, in their order."""
         return [function(job) for job in jobs] if self.pool is None else list(self.pool.map(function, jobs))
 
-    def bands(self, function: Callable[[int, int], _Result], rows: int) -> list[_Result]:
-        """Return ``function(first, last)`` of bands of rows that make up the whole, none of them empty."""
-        edges = sorted({rows * band // self.count for band in range(self.count + 1)})
+    def bands(self, function: Callable[[int, int], _Result], rows: int, *, each: int = 2) -> list[_Result]:
+        """Return ``function(first, last)`` of bands of rows that make up the whole, none of them empty.
+
+        Of several threads each has `each` bands, so that one with more to do does not keep the others waiting.
+        """
+        count = 1 if self.count == 1 else each * self.count
+        edges = sorted({rows * band // count for band in range(count + 1)})
         return self.map(lambda band: function(*band), pairwise(edges))
 
     def ranges(self, sizes: NDArray[Any], *, each: int = 8) -> list[tuple[int, int]]:

@@ -143,7 +143,7 @@ def test_boxes_that_share_cells_are_worked_off_in_their_order():
         met = [expected[j] for j in range(k) if grown[j].intersection(grown[k]).area > 0]
         expected.append(max(met, default=-1) + 1)
     assert max(expected) > 3
-    np.testing.assert_array_equal(_waves(boxes), expected)
+    np.testing.assert_array_equal(_waves(boxes, 140, 160), expected)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.2, np.pi / 2])

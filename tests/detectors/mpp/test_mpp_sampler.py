@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from roofbench.detectors.mpp.births import birth_density, make_births, no_births, propose_birth
-from roofbench.detectors.mpp.energy import Model, configuration_energy
+from roofbench.detectors.mpp.energy import Model, configuration_energy, own_energies
 from roofbench.detectors.mpp.moves import (
     GAP,
     MOVES,
@@ -24,7 +24,7 @@ from roofbench.detectors.mpp.rectangles import corners
 from roofbench.detectors.mpp.sampler import run_chain
 from roofbench.detectors.mpp.tables import make_tables
 
-NONE = np.empty((0, 5))
+NONE, NO_ENERGIES = np.empty((0, 5)), np.empty(0)
 WINDOW = (0.0, 0.0, 40.0, 40.0)
 SIDES = (2.0, 12.0)
 BOXES = np.array([[10.0, 12.0, 6.0, 4.0, 0.2], [11.0, 12.5, 6.5, 4.2, 0.22], [30.0, 25.0, 8.0, 8.0, 3.13]])
@@ -213,7 +213,9 @@ def test_the_energy_that_the_chain_adds_up_is_that_of_its_state():
 def test_annealing_finds_three_roofs_with_the_party_wall_between_two():
     tables = houses()
     best, _, _, _ = chain(tables, no_births(WINDOW, SIDES), 120000, 3, hot=20.0, cold=0.1)
-    rectangles, gained = polish(tables.small, tables.large, model(), np.array(WINDOW), best, NONE, NONE, 50, 10)
+    rectangles, gained = polish(
+        tables.small, tables.large, model(), np.array(WINDOW), best, NONE, NONE, NO_ENERGIES, 50, 10
+    )
     assert gained >= 0
     assert len(rectangles) == 3
     order = np.argsort(rectangles[:, 0])
@@ -230,7 +232,10 @@ def test_polish_never_raises_the_energy_and_says_by_how_much_it_fell():
             [rng.uniform(5, 35, n), rng.uniform(5, 35, n), rng.uniform(2, 12, (n, 2)), rng.uniform(0, math.pi, n)]
         )
         fixed = np.array([[17.0, 11.0, 6.0, 6.0, 0.3]])
-        end, gained = polish(tables.small, tables.large, model(), np.array(WINDOW), start, fixed, BOXES, 50, 6)
+        energies = own_energies(tables.small, tables.large, BOXES, model())
+        end, gained = polish(
+            tables.small, tables.large, model(), np.array(WINDOW), start, fixed, BOXES, energies, 50, 6
+        )
         before, after = (
             configuration_energy(tables.small, tables.large, state, len(state), fixed, model())
             for state in (start, end)
@@ -258,7 +263,7 @@ def test_a_hall_takes_in_its_pieces_and_says_by_how_much_the_energy_fell():
             [rng.uniform(10, 40, n), rng.uniform(10, 42, n), rng.uniform(3, 25, (n, 2)), rng.uniform(-0.1, 0.1, n)]
         )
         end, gained = polish(
-            tables.small, tables.large, large, np.array((0.0, 0.0, 60.0, 60.0)), start, fixed, NONE, 50, 6
+            tables.small, tables.large, large, np.array((0.0, 0.0, 60.0, 60.0)), start, fixed, NONE, NO_ENERGIES, 50, 6
         )
         before, after = (
             configuration_energy(tables.small, tables.large, state, len(state), fixed, large) for state in (start, end)
