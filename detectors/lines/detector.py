@@ -46,8 +46,8 @@ PAPER_PIXEL = 0.15
 _OUTSET = 0.5
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
 _CURVE_STEP = 0.3
-#: Length of a side that is tested at a time, point spacings: the paper's 3 m at its spacing of 0.5 m.
-_EXTENSION_PART = 6.0
+#: Least length of a side that is tested at a time, point spacings: a first step then holds ten points or more.
+_EXTENSION_PART = 3.5
 #: Root mean square distance from its line at which a segment must have missed a corner: point spacings, and pixels,
 #: whose staircase is no corner.
 _MISSED_CORNER, _STAIRCASE = 0.4, 0.5
@@ -160,8 +160,9 @@ class LineDetector(Detector):
     )  # fmt: skip
     extension_part: float | None = parameter(
         None, unit="m", minimum=0.1,
-        doc="least length of a side that is tested at a time; none: 6 point spacings; 1000: the whole side",
-        source="2010, 3.3.2: 3 m at a spacing of 0.5 m, and 3.3.3: the same technique for sides; reading",
+        doc="least length of a side that is tested at a time; none: the first step, 3.5 point spacings or more; 1000: "
+        "the whole side",
+        source="2010, 3.3.2: 3 m, and 3.3.3: the same technique for sides; reading",
     )  # fmt: skip
     initial_width: float = parameter(
         1.5, unit="m", minimum=0.1, doc="width of a rectangle before it is extended", source="2010, 3.3.3"
@@ -213,7 +214,7 @@ class LineDetector(Detector):
         source="2010, 3.4; reading",
     )  # fmt: skip
     new_share: float = parameter(
-        0.1, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
+        0.05, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
         doc="least share of a final rectangle outside the larger ones against which it is turned; with less it is the "
         "same building seen again; 0 keeps all, as printed",
         source="2010, 3.4: parts adjoin at right angles; reading",
@@ -342,7 +343,7 @@ class LineDetector(Detector):
 
     def _growth(self, rasters: Rasters) -> Growth:
         stop = 0.8 * rasters.spacing if self.extension_stop is None else self.extension_stop
-        part = _EXTENSION_PART * rasters.spacing if self.extension_part is None else self.extension_part
+        part = self.extension_part or max(self.extension, _EXTENSION_PART * rasters.spacing)
         return Growth(
             step=self.extension / rasters.gsd,
             least_step=max(stop / rasters.gsd, 1.0),

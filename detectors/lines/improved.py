@@ -94,12 +94,6 @@ class Improved(LineDetector):
         doc="how many times as high as the mean a peak of tests 1 and 3 is; printed: well above it",
         source="2011, 3.4; reading",
     )  # fmt: skip
-    new_share: float = parameter(
-        0.0, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
-        doc="least share of a final rectangle outside the larger ones against which it is turned; with less it is the "
-        "same building seen again; 0 keeps all, as printed",
-        source="2010, 3.4: parts adjoin at right angles; reading",
-    )  # fmt: skip
 
     def _entropy(self, image: Image) -> NDArray[np.int32]:
         prefix: NDArray[np.int32] = prefix_sums(local_entropy(grey_levels(image)))
