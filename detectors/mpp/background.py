@@ -34,6 +34,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .cells import HIGH, LOW, Cells
+from .rectangles import row_span
 from .tables import MILLI
 from .workers import ALONE, Workers
 
@@ -42,8 +43,10 @@ __all__ = ["Background", "estimate_background", "fitted_cells", "restrain", "sco
 #: Bins of the histogram: log roughness from 1 cm to 4 m, openness from 0 to 1.
 _ROUGH_BINS, _OPEN_BINS = 24, 8
 _LOG_LOW, _LOG_HIGH = math.log(0.01), math.log(4.0)
-#: What roofs and crowns are like before a scene is seen: median roughness (m), spread of its logarithm, openness.
+#: What roofs and crowns are like before a scene is seen: median roughness (m) in windows of cells of `_COMMON`, spread
+#: of its logarithm, openness. A wider window holds more ridges and steps: roofs grow as the cell, crowns as its root.
 _ROOF_ROUGH, _CROWN_ROUGH = (0.05, 0.75), (0.40, 0.55)
+_COMMON = 0.5
 _ROOF_OPEN = (0.70, 0.12, 0.07, 0.04, 0.03, 0.02, 0.01, 0.01)
 _CROWN_OPEN = (0.22, 0.10, 0.10, 0.10, 0.10, 0.12, 0.12, 0.14)
 #: log p(height | crown) is not less than this, so that a bird or a tower is no proof of anything.
@@ -167,8 +170,9 @@ def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Back
     rough = _LOG_LOW + (np.arange(_ROUGH_BINS) + 0.5) * (_LOG_HIGH - _LOG_LOW) / _ROUGH_BINS
     size_of_sample = int(counts.sum())
     pseudo = max(200.0, 0.1 * size_of_sample)
-    means = [math.log(_ROOF_ROUGH[0]), math.log(_CROWN_ROUGH[0])]
-    spreads = [_ROOF_ROUGH[1], _CROWN_ROUGH[1]]
+    wider = cells.grid.gsd / _COMMON
+    before = ((wider * _ROOF_ROUGH[0], _ROOF_ROUGH[1]), (math.sqrt(wider) * _CROWN_ROUGH[0], _CROWN_ROUGH[1]))
+    means, spreads = [math.log(centre) for centre, _ in before], [width for _, width in before]
     opens = [np.array(_ROOF_OPEN), np.array(_CROWN_OPEN)]
     share = 0.5
     belongs = np.full(counts.shape, 0.5)
@@ -180,7 +184,7 @@ def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Back
         odds = logs[1] - logs[0] + math.log(share / (1 - share))
         belongs = 1 / (1 + np.exp(-np.clip(odds, -50, 50)))
         for k, weight in enumerate((counts * (1 - belongs), counts * belongs)):
-            centre, width = (_ROOF_ROUGH, _CROWN_ROUGH)[k]
+            centre, width = before[k]
             by_rough = weight.sum(axis=1)
             size = by_rough.sum() + pseudo
             means[k] = float((by_rough @ rough + pseudo * math.log(centre)) / size)
@@ -338,3 +342,50 @@ def _score(height, state, bins, evidence, crowns, fit_weight, prices, first, las
                     continue
                 log_crown = level - 0.5 * ((0.01 * height[r, c] - mean) / spread) ** 2
                 score[r, c] = _milli(best - fit_weight * max(log_crown, _HEIGHT_FLOOR))
+
+
+def mean_evidence(
+    rectangles: NDArray[np.float64],
+    height: NDArray[np.uint16],
+    state: NDArray[np.uint8],
+    score: NDArray[np.int16],
+    background: Background,
+    *,
+    fit_weight: float,
+) -> NDArray[np.float64]:
+    """Return the mean evidence, as restrained by what lies around, of the high cells in each rectangle.
+
+    Nats, shape (n,); 0 without such a cell. Heights in crowns, which a score holds besides, are taken out again.
+    """
+    crowns = (background.crown_height, background.crown_spread)
+    means: NDArray[np.float64] = _mean_evidence(rectangles, height, state, score, crowns, fit_weight)
+    return means
+
+
+@njit(cache=True, nogil=True)
+def _mean_evidence(rectangles, height, state, score, crowns, fit_weight):  # type: ignore[no-untyped-def]
+    mean, spread = crowns
+    level = -math.log(spread * math.sqrt(2.0 * math.pi))
+    rows, columns = state.shape
+    means = np.zeros(len(rectangles))
+    for k in range(len(rectangles)):
+        cx, cy, half_a, half_b = rectangles[k, 0], rectangles[k, 1], 0.5 * rectangles[k, 2], 0.5 * rectangles[k, 3]
+        cos, sin = math.cos(rectangles[k, 4]), math.sin(rectangles[k, 4])
+        tall = half_a * abs(sin) + half_b * abs(cos)
+        total, cells = 0.0, 0
+        for r in range(max(math.floor(cy - tall), 0), min(math.ceil(cy + tall), rows)):
+            lo, hi = row_span(r + 0.5 - cy, half_a, half_b, cos, sin)
+            if lo >= hi:
+                continue
+            for c in range(max(math.ceil(cx + lo - 0.5), 0), min(math.floor(cx + hi + 0.5), columns)):
+                if state[r, c] != HIGH:
+                    continue
+                cells += 1
+                total += score[r, c] / MILLI
+                # Only evidence for a roof was given the height in a crown (`_score`).
+                if score[r, c] > 0:
+                    log_crown = level - 0.5 * ((0.01 * height[r, c] - mean) / spread) ** 2
+                    total += fit_weight * max(log_crown, _HEIGHT_FLOOR)
+        if cells > 0:
+            means[k] = total / cells
+    return means

@@ -20,6 +20,7 @@ from ...scenes.footprints import Footprints
 from ...scenes.parameters import parameter
 from ...scenes.scene import Scene
 from ..base import Detector, Step
+from .background import mean_evidence
 from .city import join_traces, sample_city, total_energy
 from .energy import own_energies
 from .figures import draw_convergence, draw_evidence, draw_heights, draw_rectangles
@@ -126,6 +127,11 @@ class MPP(Detector):
         1.0, minimum=0, doc="weight of roughness and multiple returns as evidence", swept=(0, 0.5, 1.0)
     )
     texture_limit: float = parameter(3.0, minimum=0, doc="bound of that evidence, nats per m2", swept=(2, 3, 4))
+    least_evidence: float = parameter(
+        1.25,
+        doc="least mean evidence of a building's high cells, nats per m2: roofs are smooth all over, crowns in places",
+        swept=(0.0, 1.0, 1.25, 1.5, 1.75),
+    )
     low_price: float = parameter(5.0, minimum=0, doc="nats per m2 of low ground under a roof", swept=(2, 3, 5, 8))
     void_price: float = parameter(0.1, minimum=0, doc="nats per m2 without points under a roof", swept=(0.05, 0.1, 0.3))
     data_births: float = parameter(
@@ -181,6 +187,21 @@ class MPP(Detector):
             partial(draw_rectangles, prepared, rectangles),
         )
 
+    def _evident(self, prepared: Prepared, rectangles: _Rectangles) -> NDArray[np.bool_]:
+        """Return which rectangles look like a roof on the whole, not only in sum.
+
+        Textures of neighbours resemble each other, so that the best of many windows in a crown sums up to a roof.
+        """
+        looks = mean_evidence(
+            rectangles,
+            prepared.height,
+            prepared.state,
+            prepared.score,
+            prepared.background,
+            fit_weight=self.fit_weight,
+        )
+        return looks >= self.least_evidence
+
     def _run(self, scene: Scene, rng: np.random.Generator) -> tuple[Footprints, Prepared | None, _Rectangles]:
         seed = int(rng.integers(2**63))
         seen = scene.for_detection()
@@ -198,6 +219,7 @@ class MPP(Detector):
             else:
                 rectangles, results = sample_city(self, prepared, seed, workers)
                 trace = join_traces(results)
+                rectangles = rectangles[self._evident(prepared, rectangles)]
         done = time.perf_counter()
         energies = own_energies(prepared.tables.small, prepared.tables.large, rectangles, prepared.model)
         record: dict[str, Any] = {

@@ -4,8 +4,9 @@ import naive_mpp as naive
 import numpy as np
 import pytest
 
-from roofbench.detectors.mpp.background import estimate_background, fitted_cells, restrain
+from roofbench.detectors.mpp.background import Background, estimate_background, fitted_cells, mean_evidence, restrain
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, Cells, cell_size
+from roofbench.detectors.mpp.rectangles import inside_any
 from roofbench.detectors.mpp.workers import some_workers
 from roofbench.scenes.raster import Grid
 
@@ -51,3 +52,18 @@ def test_classes_and_fitted_cells_are_those_of_the_evidence_for_any_number_of_th
     assert {np.sign(evidence[b]) for b in bins[bins >= 0]} == {-1.0, 1.0}
     for place in np.ndindex(state.shape):
         assert fitted[place] == (state[place] == HIGH and bins[place] >= 0 and evidence[bins[place]] >= 0)
+
+
+def test_the_mean_evidence_is_that_of_the_high_cells_inside_without_the_height_in_crowns():
+    rng = np.random.default_rng(1)
+    state = rng.choice([HIGH, LOW, VOID], (30, 40), p=[0.8, 0.1, 0.1])
+    score = rng.integers(-3000, 3000, state.shape).astype(np.int16)
+    height = rng.integers(250, 2500, state.shape).astype(np.uint16)
+    crowns = Background(8.0, 3.0, 0.3, 0.05, 0.4, (), 0)
+    rectangles = np.array([[20.0, 15.0, 12.0, 7.0, 0.6], [2.0, 2.0, 9.0, 5.0, 2.0], [200.0, 15.0, 5.0, 5.0, 0.0]])
+    found = mean_evidence(rectangles, height, state, score, crowns, fit_weight=0.2)
+    density = np.log(np.exp(-0.5 * ((height / 100 - 8) / 3) ** 2) / (3 * np.sqrt(2 * np.pi)))
+    evidence = score / 1000 + np.where(score > 0, 0.2 * np.maximum(density, -5), 0)
+    for rectangle, mean in zip(rectangles, found, strict=True):
+        inside = inside_any(rectangle[None], state.shape) & (state == HIGH)
+        assert mean == pytest.approx(evidence[inside].mean() if inside.any() else 0.0)
