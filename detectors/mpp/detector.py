@@ -62,10 +62,10 @@ class MPP(Detector):
     least_side: float = parameter(2.0, unit="m", minimum=0.5, doc="shortest side of a building", swept=(2.0, 3.0))
     largest_side: float = parameter(120.0, unit="m", minimum=5, doc="longest side of a building")
     slender: float = parameter(
-        3.0,
+        2.5,
         minimum=1,
         doc="ratio of the sides above which a rectangle along a larger one is a part of it",
-        swept=(2.5, 3.0, 4.0, 1000.0),
+        swept=(2.0, 2.5, 3.0, 4.0, 1000.0),
     )
     part_share: float = parameter(
         0.1,
