@@ -8,9 +8,9 @@ patch
     Roof cells connected through steps no higher than a limit. Several limits are used: a low one parts houses of
     different height, no limit keeps a block together.
 box
-    Rectangle in the grid frame. Each patch is turned to the angle at which its bounding rectangle is smallest, gives
-    that rectangle if it fills enough of it, and is taken apart greedily into the largest rectangles that it fills (L,
-    T, U shapes and rows give several).
+    Rectangle in the grid frame. Each patch is turned to the angle at which its bounding rectangle is smallest (one that
+    the border of the scene cuts: at which most of its rim runs along the axes), gives that rectangle if it fills enough
+    of it, and is taken apart greedily into the largest rectangles that it fills (L, T, U shapes and rows give several).
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ __all__ = ["propose_boxes"]
 _ANGLES = 30
 #: Largest rectangles taken from one patch.
 _PIECES = 12
+#: Cells of a rim that tell its direction.
+_LEAST_RIM = 12
 #: A patch that fills this share of its bounding rectangle also gives that one: light wells and towers are holes in it.
 _FILLED = 0.85
 
@@ -75,20 +77,22 @@ def _boxes_of_patches(
     cells, starts = cells_of_patches(labels, count, workers=workers)
 
     def work(part: tuple[int, int]) -> NDArray[np.float64]:
-        return _boxes(cells, starts, *part, finer, least_cells)  # type: ignore[no-any-return]
+        return _boxes(cells, starts, *part, finer, least_cells, labels.shape)  # type: ignore[no-any-return]
 
     return workers.map(work, workers.ranges(np.diff(starts)))
 
 
 @njit(cache=True, nogil=True)
-def _boxes(members, starts, first, last, finer, least_cells):  # type: ignore[no-untyped-def]
+def _boxes(members, starts, first, last, finer, least_cells, shape):  # type: ignore[no-untyped-def]
     """Return the boxes of some patches but those that are also patches of `finer` labels, which had them already."""
     boxes = np.empty(((_PIECES + 1) * (last - first), 5))
     n = 0
     for patch in range(first, last):
         cells = members[starts[patch] : starts[patch + 1]]
         if len(cells) >= least_cells and not _is_patch(finer, cells):
-            n = _take_apart(cells, least_cells, boxes, n)
+            rim = _rim_inside(cells, shape)
+            angle = _wall_angle(rim) if len(rim) >= _LEAST_RIM else _best_angle(_row_ends(cells))
+            n = _take_apart(cells, angle, least_cells, boxes, n)
     return boxes[:n].copy()
 
 
@@ -150,9 +154,63 @@ def _best_angle(cells):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _take_apart(cells, least_cells, boxes, n):  # type: ignore[no-untyped-def]
-    """Append the bounding and the largest filled rectangles of a patch, until what is left is small."""
-    angle = _best_angle(_row_ends(cells))
+def _rim_inside(cells, shape):  # type: ignore[no-untyped-def]
+    """Return the first and last cells of the rows and columns of a patch but those at the border of the scene.
+
+    None for a patch that does not reach the border.
+    """
+    rows, columns = shape
+    top, bottom = cells[0, 0], cells[-1, 0]
+    left, right = cells[:, 1].min(), cells[:, 1].max()
+    if top > 0 and bottom < rows - 1 and left > 0 and right < columns - 1:
+        return cells[:0]
+    ends = np.empty((2 * (bottom - top + 1 + right - left + 1), 2), dtype=cells.dtype)
+    upper = np.full(right - left + 1, rows, dtype=np.int64)
+    lower = np.full(right - left + 1, -1, dtype=np.int64)
+    n = 0
+    for i in range(len(cells)):
+        r, c = cells[i, 0], cells[i, 1]
+        first = i == 0 or cells[i - 1, 0] != r
+        last = i == len(cells) - 1 or cells[i + 1, 0] != r
+        for side in range(2):
+            if (first if side == 0 else last) and 0 < r < rows - 1 and 0 < c < columns - 1:
+                ends[n, 0], ends[n, 1] = r, c
+                n += 1
+        upper[c - left], lower[c - left] = min(upper[c - left], r), max(lower[c - left], r)
+    for c in range(left, right + 1):
+        for side in range(2):
+            r = upper[c - left] if side == 0 else lower[c - left]
+            if 0 < r < rows - 1 and 0 < c < columns - 1:
+                ends[n, 0], ends[n, 1] = r, c
+                n += 1
+    return ends[:n]
+
+
+@njit(cache=True, nogil=True)
+def _wall_angle(rim):  # type: ignore[no-untyped-def]
+    """Angle in a quarter turn at which most cells of a rim lie on common lines along the axes."""
+    reach = 0
+    for i in range(len(rim)):
+        reach = max(reach, abs(rim[i, 0] - rim[0, 0]) + abs(rim[i, 1] - rim[0, 1]))
+    best, best_angle = -1, 0.0
+    lines = np.empty((2, 2 * reach + 3), dtype=np.int64)
+    for k in range(4 * _ANGLES):
+        angle = 0.125 * math.pi * k / _ANGLES
+        cos, sin = math.cos(angle), math.sin(angle)
+        lines[:] = 0
+        for i in range(len(rim)):
+            dy, dx = rim[i, 0] - rim[0, 0], rim[i, 1] - rim[0, 1]
+            lines[0, math.floor(dx * cos + dy * sin + 0.5) + reach + 1] += 1
+            lines[1, math.floor(dy * cos - dx * sin + 0.5) + reach + 1] += 1
+        order = (lines * lines).sum()
+        if order > best:
+            best, best_angle = order, angle
+    return best_angle
+
+
+@njit(cache=True, nogil=True)
+def _take_apart(cells, angle, least_cells, boxes, n):  # type: ignore[no-untyped-def]
+    """Append the bounding and the largest filled rectangles of a patch at an angle, until what is left is small."""
     cos, sin = math.cos(angle), math.sin(angle)
     low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
     for i in range(len(cells)):

@@ -159,3 +159,17 @@ def test_the_border_of_a_box_is_found_without_its_inside(angle):
         np.testing.assert_array_equal(whole[:, 2] == 5, away < 0.5)
         np.testing.assert_array_equal(whole[:, 2] == 4, away >= 2.0)
         np.testing.assert_array_equal(border, whole[whole[:, 2] != 4])
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.35, 1.2])
+def test_a_house_cut_by_the_border_of_the_scene_keeps_the_direction_of_its_walls(angle):
+    rows, columns = np.indices((80, 90)) + 0.5
+    u = (columns - 4) * np.cos(angle) + (rows - 40) * np.sin(angle)
+    v = (rows - 40) * np.cos(angle) - (columns - 4) * np.sin(angle)
+    roof = (np.abs(u) < 26) & (np.abs(v) < 14)
+    assert roof[:, 0].sum() > 10
+    boxes = propose_boxes(np.full(roof.shape, 800, np.int32), roof, steps=(1.0,), least_cells=24)
+    largest = boxes[np.argmax(boxes[:, 2] * boxes[:, 3])]
+    turn = (largest[4] - angle + np.pi / 4) % (np.pi / 2) - np.pi / 4
+    assert abs(turn) < np.radians(1.5)
+    assert largest[2] * largest[3] > 0.5 * roof.sum()
