@@ -45,6 +45,8 @@ _COVERAGE_CELL = 2.5
 _WIDEST_VOID = 50.0
 #: Side of the cells in which points below the ground are counted, metres: with their neighbours they span a house.
 _SUNKEN_CELL = 4.0
+#: Farther from any high point than so many neighbourhoods, a void is no roof: water and wet asphalt give no returns.
+_BARE = 4.0
 #: Rows of the masks that are made at a time: distances take eight times the memory of a mask.
 _BAND = 512
 #: Distance between successive bins of the height histogram of a tile (conference version), metres.
@@ -205,10 +207,11 @@ def _nearest(
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return where the nearest point is low and where it is high, no farther than `reach` pixels; a tie is low.
 
-    Distances are those of cv2's 5 x 5 chamfer mask, within 2 % of the exact ones.
+    Where the nearest high point is farther than `_BARE` times that, it is low at any distance. Distances are those of
+    cv2's 5 x 5 chamfer mask, within 2 % of the exact ones.
     """
     is_low, is_high = np.empty_like(low), np.empty_like(high)
-    halo = math.ceil(reach) + 1
+    halo = math.ceil(_BARE * reach) + 1
     for top in range(0, len(low), _BAND):
         first, bottom = max(top - halo, 0), min(top + _BAND, len(low))
         part = slice(first, bottom + halo)
@@ -216,7 +219,7 @@ def _nearest(
             cv2.distanceTransform(1 - hits[part], cv2.DIST_L2, cv2.DIST_MASK_5)[top - first : bottom - first]
             for hits in (low, high)
         )
-        is_low[top:bottom] = (to_low <= to_high) & (to_low <= reach)
+        is_low[top:bottom] = ((to_low <= to_high) & (to_low <= reach)) | (to_high > _BARE * reach)
         is_high[top:bottom] = (to_high < to_low) & (to_high <= reach)
     return is_low, is_high
 
@@ -233,8 +236,9 @@ def build_masks(
     neighbourhood : float
         Side of the square that a point marks, metres.
     nearest : bool
-        Whether the primary mask is white where the nearest point is low, and the secondary mask also black where it is
-        high, each no farther than `neighbourhood`; else both are made of squares alone, as printed.
+        Whether the primary mask is white where the nearest point is low or nothing high is near, and the secondary mask
+        also black where the nearest is high, no farther than `neighbourhood`; else both are made of squares alone, as
+        printed.
     """
     side = 2 * max(0, round((neighbourhood / grid.gsd - 1) / 2)) + 1
     coverage = _coverage(points, grid)

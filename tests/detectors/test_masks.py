@@ -31,17 +31,29 @@ def test_a_low_point_marks_five_by_five_pixels_white_and_a_high_one_black():
 def test_a_point_at_the_threshold_marks_nothing():
     masks = build_masks(cloud([15.0], [15.0], [2.5]), np.array([2.5]), GRID, neighbourhood=0.75, nearest=True)
     assert masks.secondary.sum() == 0
-    assert (masks.primary == masks.coverage).all()
+    # Nothing high is near, so nothing is a roof.
+    assert masks.primary.sum() == 0
+    printed = build_masks(cloud([15.0], [15.0], [2.5]), np.array([2.5]), GRID, neighbourhood=0.75, nearest=False)
+    assert (printed.primary == printed.coverage).all()
 
 
-@pytest.mark.parametrize("nearest", [True, False])
-def test_beyond_the_points_nothing_is_black_but_a_void_within_them_is(nearest):
+def around_a_void(height):
+    """Points every half metre of the western half, at a height above ground; none within 4 m of a place."""
     x, y = (values.ravel() for values in np.meshgrid(np.arange(0.25, 15, 0.5), np.arange(0.25, 30, 0.5)))
     void = (abs(x - 7) < 4) & (abs(y - 15) < 4)
-    points = cloud(x[~void], y[~void], np.zeros((~void).sum()))
-    masks = build_masks(points, np.full(len(points), 2.5), GRID, neighbourhood=0.75, nearest=nearest)
+    return cloud(x[~void], y[~void], np.full((~void).sum(), height))
+
+
+@pytest.mark.parametrize(
+    ("nearest", "height", "black"), [(False, 0.0, True), (False, 5.0, True), (True, 0.0, False), (True, 5.0, True)]
+)
+def test_a_void_is_black_where_something_high_is_near_and_in_print_anywhere_but_beyond_the_points(
+    nearest, height, black
+):
+    points = around_a_void(height)
+    masks = build_masks(points, np.full(len(points), 2.5), GRID, neighbourhood=1.5, nearest=nearest)
     assert masks.primary[:, 120:].sum() == 0
-    assert masks.primary[90:110, 35:58].all()
+    assert (masks.primary[90:110, 35:58] == black).all()
 
 
 def random_roof(seed, count):
@@ -57,7 +69,8 @@ def test_each_place_is_what_the_nearest_point_is():
     to_low, to_high = (naive_lines.distances(points, chosen, GRID) for chosen in (points.z < 2.5, points.z > 2.5))
     far = np.minimum(to_low, to_high)
     clear = (abs(to_low - to_high) > 0.03 * far) & (abs(far - 1.5) > 0.05) & (masks.coverage == 1)
-    white = (to_low < to_high) & (to_low < 1.5)
+    clear &= abs(to_high - 6.0) > 0.15
+    white = ((to_low < to_high) & (to_low < 1.5)) | (to_high > 6.0)
     assert (masks.primary[clear] == ~white[clear]).all()
     black = (squares.secondary == 1) | ((to_high < to_low) & (to_high < 1.5))
     assert (masks.secondary[clear] == black[clear]).all()
