@@ -136,8 +136,9 @@ class NDSM(Detector):
         """Detect, and return every intermediate result."""
         scene.require(self.requires)
         scene = scene.for_detection()
-        points = scene.points
-        assert points is not None
+        assert scene.points is not None
+        # Three points that are there twice lie in one plane like six of a roof.
+        points = scene.points.distinct()
         heights = heights_above_ground(points, ground_of(scene, use_dem=self.dem))
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)

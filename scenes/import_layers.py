@@ -100,11 +100,10 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
             place.log.note(f"{np.count_nonzero(noise)} points of the classes noise (7 and 18) were left out")
             if len(cloud) == 0:
                 raise InputError(f"{names} holds no points but noise (classes 7 and 18)")
-    repeats = cloud.repeats()
-    if repeats.any():
-        cloud = cloud.take(~repeats)
-        place.log.note(f"{np.count_nonzero(repeats)} points that were there twice were left out")
-    return cloud
+    distinct = cloud.distinct()
+    if len(distinct) < len(cloud):
+        place.log.note(f"{len(cloud) - len(distinct)} points that were there twice were left out")
+    return distinct
 
 
 def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, bands: Sequence[str] | None) -> Image:

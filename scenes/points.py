@@ -79,6 +79,11 @@ class PointCloud:
         repeated[later[equal]] = True
         return repeated
 
+    def distinct(self) -> PointCloud:
+        """Return the points without repeats; the cloud itself when it has none."""
+        repeats = self.repeats()
+        return self.take(~repeats) if repeats.any() else self
+
     def unclassified(self) -> PointCloud:
         """Return the same points without classification: what a detector may see."""
         return dataclasses.replace(self, classification=None)

@@ -194,6 +194,16 @@ def test_the_same_points_in_another_order_give_the_same_footprints():
     np.testing.assert_allclose(shapely.get_coordinates(one), shapely.get_coordinates(two), atol=1e-6)
 
 
+def test_points_that_are_there_twice_count_once():
+    place = Place().roof(rectangle(14, 9, 33)).tree(translate(CENTRE, 15, 15).buffer(4))
+    scene = place.scene()
+    twice = Scene("twice", EXTENT, points=scene.points.take(np.repeat(np.arange(len(scene.points)), 2)), dem=scene.dem)
+    # The ground is filtered from all points.
+    one, two = (NDSM().detect(s, RNG).polygons for s in (scene, twice))
+    assert len(one) == len(two) == 1
+    assert iou(one[0], two[0]) > 0.995
+
+
 def test_it_is_found_by_name():
     assert make_detector("ndsm[height=3,outline=rectangle]") == NDSM(height=3, outline="rectangle")
 
