@@ -64,8 +64,15 @@ def outline_buildings(rectangles: NDArray[np.float64], blocks: NDArray[np.object
             rivals = tree.query(outlines[k], predicate="dwithin", distance=2 * _REACH)
             part = _part(rectangles[k], rectangles[rivals[rivals != k]], part, grid)
         together = shapely.area(shapely.union(part, outlines[k]))
-        if shapely.area(shapely.intersection(part, outlines[k])) < _AS_GOOD * together:
+        if not part.is_empty and shapely.area(shapely.intersection(part, outlines[k])) < _AS_GOOD * together:
             result[k] = part
+    # Zones are drawn one by one, and rectangles know of no zones: where two share a strip, the first keeps it.
+    drawn = result != outlines
+    for k in np.flatnonzero(drawn):
+        rivals = tree.query(outlines[k], predicate="dwithin", distance=2 * _REACH)
+        rivals = rivals[(rivals != k) & (~drawn[rivals] | (rivals < k))]
+        rest = _whole(shapely.difference(result[k], shapely.union_all(result[rivals])))
+        result[k] = outlines[k] if rest.is_empty else rest
     return result
 
 
@@ -84,12 +91,17 @@ def _part(rectangle: NDArray[np.float64], rivals: NDArray[np.float64], block: An
         np.minimum(lead, _nearness(rival, x, y) - own, out=lead)
     # Where the lead is more than nothing, the "coverage" is more than one half.
     zone = shapely.union_all(trace((lead + 0.5).astype(np.float32), window))
-    parts = shapely.get_parts(shapely.intersection(zone, block))
+    return shapely.simplify(_whole(shapely.intersection(zone, block)), _STRAIGHT)
+
+
+def _whole(outline: Any) -> Any:
+    """Return an outline without its scraps; the largest part always stays."""
+    parts = shapely.get_parts(outline)
     parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
-    if len(parts) == 0:
-        return shapely.Polygon()
+    if len(parts) < 2:
+        return parts[0] if len(parts) else shapely.Polygon()
     sizes = shapely.area(parts)
-    return shapely.simplify(shapely.union_all(parts[(sizes >= _SCRAP) | (sizes == sizes.max())]), _STRAIGHT)
+    return shapely.union_all(parts[(sizes >= _SCRAP) | (sizes == sizes.max())])
 
 
 def _nearness(rectangle: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
