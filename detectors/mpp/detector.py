@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from ...scenes.footprints import Footprints
@@ -23,10 +24,11 @@ from ..base import Detector, Step
 from .background import mean_evidence
 from .city import join_traces, sample_city, total_energy
 from .energy import own_energies
-from .figures import draw_convergence, draw_evidence, draw_heights, draw_rectangles
+from .figures import draw_convergence, draw_evidence, draw_heights, draw_outlines
 from .outcome import as_blocks, as_buildings
 from .preparation import Prepared, prepare
 from .printed import sample_printed
+from .rectangles import to_world
 from .workers import some_workers
 
 __all__ = ["MPP"]
@@ -155,12 +157,15 @@ class MPP(Detector):
     workers: int = parameter(1, minimum=1, doc="threads; they change the time, never the result")
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
-        """Return rectangles with the attributes height, tau, slope (m, m, m/m), roof and energy, and the run record."""
+        """Return buildings with the attributes height, tau, slope (m, m, m/m), roof and energy, and the run record.
+
+        Blocks (`outline`) have no attributes.
+        """
         return self._run(scene, rng)[0]
 
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
         """Yield heights, evidence, boxes, convergence and result of the same run."""
-        found, prepared, rectangles = self._run(scene, rng)
+        found, prepared = self._run(scene, rng)
         if prepared is None:
             return
         boxes = prepared.boxes
@@ -173,7 +178,7 @@ class MPP(Detector):
         yield Step(
             "03-boxes",
             f"{len(boxes)} boxes that the data suggest as births.",
-            partial(draw_rectangles, prepared, boxes, colour="darkorange"),
+            partial(draw_outlines, prepared, shapely.polygons(to_world(boxes, prepared.grid)), colour="darkorange"),
         )
         trace = found.metadata["trace"]
         yield Step(
@@ -183,8 +188,8 @@ class MPP(Detector):
         )
         yield Step(
             "05-buildings",
-            f"{len(rectangles)} buildings after polishing.",
-            partial(draw_rectangles, prepared, rectangles),
+            f"{len(found)} buildings after polishing.",
+            partial(draw_outlines, prepared, found.polygons),
         )
 
     def _evident(self, prepared: Prepared, rectangles: _Rectangles) -> NDArray[np.bool_]:
@@ -202,7 +207,7 @@ class MPP(Detector):
         )
         return looks >= self.least_evidence
 
-    def _run(self, scene: Scene, rng: np.random.Generator) -> tuple[Footprints, Prepared | None, _Rectangles]:
+    def _run(self, scene: Scene, rng: np.random.Generator) -> tuple[Footprints, Prepared | None]:
         seed = int(rng.integers(2**63))
         seen = scene.for_detection()
         seen.require(self.requires)
@@ -210,7 +215,7 @@ class MPP(Detector):
         points = seen.points
         assert points is not None
         if not _are_many(points.z):
-            return Footprints.empty(crs=scene.crs, source=self.name), None, np.empty((0, 5))
+            return Footprints.empty(crs=scene.crs, source=self.name), None
         with some_workers(self.workers) as workers:
             prepared = prepare(self, points, seen, workers)
             ready = time.perf_counter()
@@ -245,4 +250,4 @@ class MPP(Detector):
                 record=record,
                 source=self.name,
             )
-        return found, prepared, rectangles
+        return found, prepared

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from .cells import HIGH
-from .rectangles import to_world
 from .tables import MILLI
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from .preparation import Prepared
 
-__all__ = ["draw_convergence", "draw_evidence", "draw_heights", "draw_rectangles"]
+__all__ = ["draw_convergence", "draw_evidence", "draw_heights", "draw_outlines"]
 
 
 def _extent(prepared: Prepared) -> tuple[float, float, float, float]:
@@ -60,19 +60,18 @@ def draw_evidence(prepared: Prepared, figure: Figure) -> None:
     _finish(axes)
 
 
-def draw_rectangles(
-    prepared: Prepared, rectangles: NDArray[np.float64], figure: Figure, *, colour: str = "crimson"
+def draw_outlines(
+    prepared: Prepared, polygons: NDArray[np.object_], figure: Figure, *, colour: str = "crimson"
 ) -> None:
-    """Draw rectangles over the shaded relief."""
-    from matplotlib.collections import PolyCollection
+    """Draw outlines, with their holes, over the shaded relief."""
+    from matplotlib.collections import LineCollection
 
     axes = figure.add_subplot()
     _shade(prepared, axes)
-    if len(rectangles):
-        outlines = PolyCollection(
-            list(to_world(rectangles, prepared.grid)), facecolors="none", edgecolors=colour, linewidths=0.8
-        )
-        axes.add_collection(outlines)
+    rings = shapely.get_rings(shapely.get_parts(polygons))
+    axes.add_collection(
+        LineCollection([shapely.get_coordinates(ring) for ring in rings], colors=colour, linewidths=0.8)
+    )
     west, east, south, north = _extent(prepared)
     axes.set_xlim(west, east)
     axes.set_ylim(south, north)

@@ -40,7 +40,7 @@ STAGES = {
     "chains": ("annealing", "run_chain"),
     "polish of seams": ("city", "polish"),
     "walls": ("city", "close_walls"),
-    "footprints": ("detector", "as_rectangles"),
+    "footprints": ("detector", "as_buildings"),
 }
 EFFORTS = (0, 0.1, 0.25, 0.5, 1, 2, 4)
 
