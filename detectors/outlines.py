@@ -58,7 +58,9 @@ def trace(coverage: NDArray[np.float32], grid: Grid) -> NDArray[np.object_]:
     import contourpy
 
     x, y = grid.to_world(np.arange(-1, grid.rows + 1) + 0.5, np.arange(-1, grid.columns + 1) + 0.5)
-    generator = contourpy.contour_generator(x, y, np.pad(coverage, 1), fill_type=contourpy.FillType.OuterOffset)
+    # Under its old name, so that what was handed over for this alone is let go.
+    coverage = np.pad(coverage, 1)
+    generator = contourpy.contour_generator(x, y, coverage, fill_type=contourpy.FillType.OuterOffset)
     filled: Any = generator.filled(0.5, np.inf)
     rings, offsets = filled
     polygons = np.empty(len(rings), dtype=object)

@@ -54,10 +54,20 @@ def outline_blocks(
     score : ndarray of int16, shape (rows, columns)
         See `background`.
     """
+    gsd = grid.gsd
+    traced = trace(coverage_of_mask(_built(rectangles, gsd, state, score)), grid)
+    polygons: NDArray[np.object_] = regularise(traced, max(gsd, _STRAIGHT))
+    large: NDArray[np.bool_] = shapely.area(polygons) >= _SMALLEST
+    return polygons[large]
+
+
+def _built(
+    rectangles: NDArray[np.float64], gsd: float, state: NDArray[np.uint8], score: NDArray[np.int16]
+) -> NDArray[np.bool_]:
+    """Return the cells of blocks."""
     import cv2
 
-    gsd = grid.gsd
-    inside = inside_any(rectangles, grid.shape)
+    inside = inside_any(rectangles, state.shape)
     high = state == HIGH
     around = cv2.GaussianBlur(np.where(high, score, 0).astype(np.float32), (0, 0), _SIGMA / gsd)
     roof = high & (around > 0)
@@ -65,10 +75,7 @@ def outline_blocks(
     built = roof | sure
     built |= high & closed(built, 0.5 * _NARROW / gsd)
     built = opened(without_holes(built, _HOLE / gsd**2), _OPENING / gsd) | sure
-    _, labels = cv2.connectedComponents(built.astype(np.uint8), connectivity=4)
-    sizes = np.bincount(labels.ravel())
-    kept = np.bincount(labels.ravel(), weights=inside.ravel()) >= _CONFIRMED * sizes
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats(built.astype(np.uint8), connectivity=4)
+    kept = np.bincount(labels[inside], minlength=count) >= _CONFIRMED * statistics[:, cv2.CC_STAT_AREA]
     kept[0] = False
-    polygons: NDArray[np.object_] = regularise(trace(coverage_of_mask(kept[labels]), grid), max(gsd, _STRAIGHT))
-    large: NDArray[np.bool_] = shapely.area(polygons) >= _SMALLEST
-    return polygons[large]
+    return np.asarray(kept[labels])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
@@ -25,10 +25,12 @@ from .background import mean_evidence
 from .city import join_traces, sample_city, total_energy
 from .energy import own_energies
 from .figures import draw_convergence, draw_evidence, draw_heights, draw_outlines
-from .outcome import as_blocks, as_buildings
+from .memory import give_back
+from .outcome import as_blocks, as_buildings, fit_roofs
 from .preparation import Prepared, prepare
 from .printed import sample_printed
 from .rectangles import to_world
+from .tables import NO_TABLES
 from .workers import some_workers
 
 __all__ = ["MPP"]
@@ -227,6 +229,7 @@ class MPP(Detector):
                 rectangles = rectangles[self._evident(prepared, rectangles)]
         done = time.perf_counter()
         energies = own_energies(prepared.tables.small, prepared.tables.large, rectangles, prepared.model)
+        fits = fit_roofs(prepared, rectangles)
         record: dict[str, Any] = {
             "mode": self.mode,
             "seed": seed,
@@ -237,12 +240,16 @@ class MPP(Detector):
             "trace": trace,
             "seconds": {"preparation": ready - began, "sampling": done - ready},
         }
+        # Outlines are made of cells alone, and take what the tables held.
+        prepared = replace(prepared, tables=NO_TABLES)
+        give_back()
         if self.outline == "blocks":
             found = as_blocks(prepared, rectangles, crs=scene.crs, record=record, source=self.name)
         else:
             found = as_buildings(
                 prepared,
                 rectangles,
+                fits,
                 energies,
                 # The printed algorithm ends with its rectangles.
                 follow_cells=self.outline == "buildings" and self.mode == "reversible",

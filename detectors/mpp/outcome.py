@@ -17,24 +17,11 @@ from .preparation import Prepared
 from .rectangles import to_world
 from .roofs import KINDS, fit_roof
 
-__all__ = ["as_blocks", "as_buildings"]
+__all__ = ["as_blocks", "as_buildings", "fit_roofs"]
 
 
-def as_buildings(
-    prepared: Prepared,
-    rectangles: NDArray[np.float64],
-    energies: NDArray[np.float64],
-    *,
-    follow_cells: bool,
-    crs: str | None,
-    record: dict[str, Any],
-    source: str,
-) -> Footprints:
-    """Return one footprint a rectangle, with the attributes height, tau, slope (m, m, m/m), roof and energy.
-
-    Footprints are the rectangles, or where `follow_cells` is set and a rectangle is no good outline, its part of the
-    block (`buildings`).
-    """
+def fit_roofs(prepared: Prepared, rectangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what `roofs.fit_roof` says of each rectangle, shape (n, 5)."""
     tables, model = prepared.tables, prepared.model
     share = model.weight * model.fit_weight
     price = model.roof_price / share if share > 0 else math.inf
@@ -52,6 +39,25 @@ def as_buildings(
             model.cell,
             fit,
         )
+    return fits
+
+
+def as_buildings(
+    prepared: Prepared,
+    rectangles: NDArray[np.float64],
+    fits: NDArray[np.float64],
+    energies: NDArray[np.float64],
+    *,
+    follow_cells: bool,
+    crs: str | None,
+    record: dict[str, Any],
+    source: str,
+) -> Footprints:
+    """Return one footprint a rectangle, with the attributes height, tau, slope (m, m, m/m), roof and energy.
+
+    Footprints are the rectangles, or where `follow_cells` is set and a rectangle is no good outline, its part of the
+    block (`buildings`).
+    """
     if follow_cells:
         outlines = outline_buildings(rectangles, _blocks(prepared, rectangles), prepared.grid)
     else:

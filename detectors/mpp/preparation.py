@@ -49,6 +49,7 @@ class Prepared:
         Thousandths of a nat.
     background : Background
     tables : Tables
+        `tables.NO_TABLES` once they have served.
     model : Model
     boxes : ndarray, shape (n, 5)
         Best first.

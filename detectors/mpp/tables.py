@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from .workers import ALONE, Workers
 
-__all__ = ["LONGEST", "MILLI", "TALLEST", "Tables", "make_tables", "part_sums"]
+__all__ = ["LONGEST", "MILLI", "NO_TABLES", "TALLEST", "Tables", "make_tables", "part_sums"]
 
 #: Steps of the score per nat.
 MILLI = 1000.0
@@ -46,6 +46,10 @@ class Tables:
     def shape(self) -> tuple[int, int]:
         """Rows and columns of cells."""
         return self.small.shape[0], self.small.shape[1] - 1
+
+
+#: Those of no cells: what is left of tables that have served.
+NO_TABLES = Tables(np.empty((0, 1, 8), dtype=np.int32), np.empty((0, 1, 4), dtype=np.int64))
 
 
 def make_tables(
