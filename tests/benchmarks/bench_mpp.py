@@ -1,7 +1,8 @@
 """Speed and memory of the marked point process: stages, proposals, quality against time, threads, bytes a cell.
 
 Run by hand: ``python tests/benchmarks/bench_mpp.py [stages] [moves] [budget] [threads] [span] [memory]`` (all
-without names), ``--scenes toronto-a,vaihingen-a --repeats 5 --plot docs/images/mpp-budget.png``.
+without names), ``--scenes toronto-a,vaihingen-a --repeats 5 --plot docs/images/mpp-budget.png``, and
+``--outline buildings`` for outlines along the cells as well.
 
 From arrays in memory to rectangles, after the kernels are compiled. CPU seconds of one thread where threads are not the
 subject, the median and the least of the repeats. Threads: wall seconds of one and of two threads in turn, side by side,
@@ -42,6 +43,7 @@ STAGES = {
     "walls": ("city", "close_walls"),
     "footprints": ("detector", "as_buildings"),
 }
+OUTLINE = "rectangles"
 EFFORTS = (0, 0.1, 0.25, 0.5, 1, 2, 4)
 
 
@@ -70,8 +72,9 @@ def scene_of(name):
     ), None
 
 
-def detect(scene, selection="mpp", seed=0):
-    return rb.make_detector(selection).detect(scene, np.random.default_rng(seed))
+def detect(scene, seed=0, **parameters):
+    named = ",".join(f"{name}={value}" for name, value in {"outline": OUTLINE, **parameters}.items())
+    return rb.make_detector(f"mpp[{named}]").detect(scene, np.random.default_rng(seed))
 
 
 def module(name):
@@ -169,7 +172,7 @@ def budget(scenes, repeats, plot):
             seconds, rows = [], []
             for seed in range(repeats):
                 began = time.process_time()
-                found = detect(scene, f"mpp[effort={effort}]", seed)
+                found = detect(scene, seed, effort=effort)
                 seconds.append(time.process_time() - began)
                 result = evaluator.evaluate(found, reference)
                 shares = (result.object.quality, result.pixel.quality, result.object.multiple_detection_rate)
@@ -216,11 +219,11 @@ def threads(scenes, repeats):
         walls = {1: [], 2: []}
         spent = {1: [], 2: []}
         for count in (1, 2):
-            detect(scene, f"mpp[workers={count}]")
+            detect(scene, workers=count)
         for _ in range(repeats):
             for count in (1, 2):
                 began, cpu = time.perf_counter(), time.process_time()
-                detect(scene, f"mpp[workers={count}]")
+                detect(scene, workers=count)
                 walls[count].append(time.perf_counter() - began)
                 spent[count].append(time.process_time() - cpu)
         ratios = [one / two for one, two in zip(walls[1], walls[2], strict=True)]
@@ -255,7 +258,7 @@ def span(scenes, repeats):
         Workers.map = laid_out
         for _ in range(repeats):
             saved[0], began = 0.0, time.process_time()
-            detect(scene, "mpp[workers=2]")
+            detect(scene, workers=2)
             whole = time.process_time() - began
             rows.append((whole, whole - saved[0]))
         Workers.map = held
@@ -313,8 +316,11 @@ def main():
     parser.add_argument("parts", nargs="*", help="stages, moves, budget, threads, span, memory")
     parser.add_argument("--scenes", default="toronto-a,vaihingen-a")
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--outline", default="rectangles", help="buildings, rectangles or blocks")
     parser.add_argument("--plot", help="where to save the picture of quality against time")
     options = parser.parse_args()
+    global OUTLINE
+    OUTLINE = options.outline
     parts = options.parts or ["stages", "moves", "budget", "threads", "span", "memory"]
     if parts == ["memory-of"]:
         memory(options.scenes)
@@ -337,7 +343,9 @@ def main():
             print(f"  {scene.name}", flush=True)
             with tempfile.TemporaryDirectory() as folder:
                 save(scene, folder)
-                subprocess.run([sys.executable, __file__, "memory-of", "--scenes", folder], check=True)
+                subprocess.run(
+                    [sys.executable, __file__, "memory-of", "--scenes", folder, "--outline", OUTLINE], check=True
+                )
 
 
 if __name__ == "__main__":
