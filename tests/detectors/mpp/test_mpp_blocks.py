@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 import shapely
 
+from roofbench.detectors import morphology
+from roofbench.detectors.mpp import blocks
 from roofbench.detectors.mpp.blocks import outline_blocks
 from roofbench.detectors.mpp.cells import HIGH, LOW
 from roofbench.detectors.mpp.rectangles import corners, inside_any
+from roofbench.detectors.outlines import coverage_of_mask, trace
 from roofbench.scenes.raster import Grid
 
 GRID = Grid.covering((0.0, 0.0, 60.0, 40.0), 0.5)
@@ -72,3 +75,34 @@ def test_cells_inside_rectangles_are_those_whose_centre_is():
     y, x = np.mgrid[:30, :40] + 0.5
     union = shapely.union_all(shapely.polygons(corners(rectangles)))
     np.testing.assert_array_equal(inside_any(rectangles, (30, 40)), shapely.contains_xy(union, x, y))
+
+
+def smooth_noise(seed, shape=(90, 70)):
+    """A mask of blobs, some of which touch by corners alone."""
+    values = np.random.default_rng(seed).normal(size=shape)
+    for _ in range(2):
+        values = values + np.roll(values, 1, 0) + np.roll(values, 1, 1)
+    return values > 0.5
+
+
+@pytest.mark.parametrize("strip", [1, 13, 40])
+def test_blocks_traced_in_strips_are_those_traced_at_once(monkeypatch, strip):
+    mask, grid = smooth_noise(1), Grid(4000.0, 9000.0, 0.75, 90, 70)
+    whole = trace(coverage_of_mask(mask), grid)
+    monkeypatch.setattr(blocks, "_STRIP", strip)
+    parts = blocks._traced(mask, grid)
+    assert len(whole) > 20
+    assert sorted(shapely.to_wkb(shapely.normalize(parts)).tolist()) == sorted(
+        shapely.to_wkb(shapely.normalize(whole)).tolist()
+    )
+    assert len(blocks._traced(np.zeros_like(mask), grid)) == 0
+
+
+@pytest.mark.parametrize("radius", [2.0, 5.0])
+@pytest.mark.parametrize("band", [1, 7, 64])
+def test_a_mask_opened_in_bands_is_that_opened_at_once(monkeypatch, radius, band):
+    mask = np.kron(smooth_noise(2, (30, 24)), np.ones((5, 5), bool))
+    whole = morphology.opened(mask, radius)
+    assert 0 < whole.sum() < mask.sum()
+    monkeypatch.setattr(morphology, "_BAND", band)
+    np.testing.assert_array_equal(morphology.opened(mask, radius), whole)
