@@ -13,6 +13,8 @@ storey
     roof of that level rather than of another, and that reaches the border on one side at most: a tower on its podium,
     a storey set back from the front. A house in a row reaches two opposite sides, a house with a low annexe three:
     both stay.
+wave
+    Boxes of which none shares a cell with another, each later than all larger boxes that it shares cells with.
 
 A box is a frame when at least three sides of its border lie at the base and little in it is lower. Its storeys are
 lowered to the plane of its base, as other superstructures are: one building has one rectangle.
