@@ -132,9 +132,11 @@ class MPP(Detector):
     )
     texture_limit: float = parameter(3.0, minimum=0, doc="bound of that evidence, nats per m2", swept=(2, 3, 4))
     least_evidence: float = parameter(
-        1.25,
-        doc="least mean evidence of a building's high cells, nats per m2: roofs are smooth all over, crowns in places",
-        swept=(0.0, 1.0, 1.25, 1.5, 1.75),
+        0.4,
+        minimum=0,
+        maximum=1,
+        doc="least mean evidence of a building's high cells, share of texture_limit: crowns are smooth in places only",
+        swept=(0.0, 0.3, 0.4, 0.5),
     )
     low_price: float = parameter(5.0, minimum=0, doc="nats per m2 of low ground under a roof", swept=(2, 3, 5, 8))
     void_price: float = parameter(0.1, minimum=0, doc="nats per m2 without points under a roof", swept=(0.05, 0.1, 0.3))
@@ -207,7 +209,8 @@ class MPP(Detector):
             prepared.background,
             fit_weight=self.fit_weight,
         )
-        return looks >= self.least_evidence
+        # Scores are rounded to thousandths.
+        return looks >= self.least_evidence * self.texture_limit * min(self.texture_weight, 1.0) - 1e-3
 
     def _run(self, scene: Scene, rng: np.random.Generator) -> tuple[Footprints, Prepared | None]:
         seed = int(rng.integers(2**63))
