@@ -135,7 +135,7 @@ class MPP(Detector):
         0.4,
         minimum=0,
         maximum=1,
-        doc="least mean evidence of a building's high cells, share of texture_limit: crowns are smooth in places only",
+        doc="least mean evidence of a building's high cells, share of texture_limit; 0: not asked",
         swept=(0.0, 0.3, 0.4, 0.5),
     )
     low_price: float = parameter(5.0, minimum=0, doc="nats per m2 of low ground under a roof", swept=(2, 3, 5, 8))
@@ -201,7 +201,10 @@ class MPP(Detector):
 
         Textures of neighbours resemble each other, so that the best of many windows in a crown sums up to a roof.
         """
-        looks = mean_evidence(
+        least = self.least_evidence * self.texture_limit * min(self.texture_weight, 1.0)
+        if least == 0:
+            return np.ones(len(rectangles), dtype=np.bool_)
+        return least <= mean_evidence(
             rectangles,
             prepared.height,
             prepared.state,
@@ -209,8 +212,6 @@ class MPP(Detector):
             prepared.background,
             fit_weight=self.fit_weight,
         )
-        # Scores are rounded to thousandths.
-        return looks >= self.least_evidence * self.texture_limit * min(self.texture_weight, 1.0) - 1e-3
 
     def _run(self, scene: Scene, rng: np.random.Generator) -> tuple[Footprints, Prepared | None]:
         seed = int(rng.integers(2**63))
