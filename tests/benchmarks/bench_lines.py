@@ -31,7 +31,7 @@ STAGES = {
     "image edges": ("extract_edges",),
     "votes": ("longest_image_lines", "cast_votes"),
     "initial rectangles": ("initial_rectangles",),
-    "final rectangles": ("final_rectangles",),
+    "final rectangles, duplicates": ("final_rectangles", "find_duplicates"),
     "orientation histograms": ("judge",),
 }  # fmt: skip
 
