@@ -214,7 +214,7 @@ class LineDetector(Detector):
         source="2010, 3.4; reading",
     )  # fmt: skip
     new_share: float = parameter(
-        0.05, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
+        0.1, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
         doc="least share of a final rectangle outside the larger ones against which it is turned; with less it is the "
         "same building seen again; 0 keeps all, as printed",
         source="2010, 3.4: parts adjoin at right angles; reading",

@@ -73,7 +73,8 @@ ABLATIONS = {
         "inside_share=1",
         "inside_margin=0",
         "rise=0",
-        "new_share=0.1",
+        "new_share=0",
+        "new_share=0.2",
     ),
 }
 #: Steps that the page shows.
