@@ -214,7 +214,8 @@ def _final(figure: Figure, trace: Trace) -> None:
     _outlines(axes, twice, _TWICE, linewidths=0.8, linestyles="--")
     _outlines(axes, lost, _LOST, linewidths=1.0)
     _outlines(axes, trace.final, _KEPT, linewidths=1.4)
-    entries = [("building", _KEPT, len(trace.final)), ("seen again", _TWICE, len(twice))]
+    entries = [("building", _KEPT, len(trace.final))]
+    entries += [("seen again", _TWICE, len(twice))] if len(twice) else []
     if trace.texture is not None:
         entries.append(("no texture of a building", _LOST, len(lost)))
         # Off the centre, which rectangles of one house share.

@@ -132,6 +132,11 @@ def means(rows):
     return [statistics.fmean(column) if column else float("nan") for column in columns]
 
 
+def cells(row):
+    """Return a row of COLUMNS as cells of a table: percentages to a tenth, metres to a centimetre."""
+    return " | ".join([f"{share:.1f}" for share in row[:-1]] + [f"{row[-1]:.2f}"])
+
+
 def pattern(seeds):
     print("| detector, area | " + " | ".join(COLUMNS) + " |")
     print("|---" * (len(COLUMNS) + 1) + "|")
@@ -139,7 +144,7 @@ def pattern(seeds):
         scenes = [scene_of(name, seed) for name in names for seed in seeds]
         for detector in ("original", "original[ground=point-dem]", "improved"):
             row = means([indices(scene, detector) for scene in scenes])
-            print(f"| {detector}, {area} | " + " | ".join(f"{value:.1f}" for value in row) + " |", flush=True)
+            print(f"| {detector}, {area} | {cells(row)} |", flush=True)
 
 
 def ablation(seeds, detectors):
@@ -281,8 +286,7 @@ def tiles(seeds):
         ("above T_h of their tile", [above_tile(scene) for scene in scenes]),
     ):
         row = means([indices(scene, "original", known) for scene, known in zip(scenes, references, strict=True)])
-        values = " | ".join(f"{value:.1f}" for value in row)
-        print(f"| {label} | {sum(map(len, references))} | {values} |", flush=True)
+        print(f"| {label} | {sum(map(len, references))} | {cells(row)} |", flush=True)
 
 
 def save(figure, name):
@@ -293,7 +297,7 @@ def save(figure, name):
     for dpi in (90, 75, 60, 50):
         figure.savefig(IMAGES / name, dpi=dpi, bbox_inches="tight")
         with Picture.open(IMAGES / name) as picture:
-            picture.convert("RGB").quantize(256).save(IMAGES / name, optimize=True)
+            picture.convert("RGB").quantize(256, Picture.Quantize.MAXCOVERAGE).save(IMAGES / name, optimize=True)
         if (IMAGES / name).stat().st_size < 290_000:
             return
 
