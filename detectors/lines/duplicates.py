@@ -46,6 +46,32 @@ def new_share(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
     return new / _LATTICE**2
 
 
+@njit(cache=True)
+def _find(
+    boxes: NDArray[np.float64],
+    order: NDArray[np.int64],
+    directions: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    radius: NDArray[np.float64],
+    least: float,
+    tolerance: float,
+) -> NDArray[np.bool_]:
+    duplicates = np.zeros(len(boxes), dtype=np.bool_)
+    turned = np.empty_like(boxes)
+    for place in range(len(order)):
+        i = order[place]
+        found = 0
+        for j in order[:place]:
+            apart = math.hypot(centres[i, 0] - centres[j, 0], centres[i, 1] - centres[j, 1])
+            if duplicates[j] or apart >= radius[i] + radius[j]:
+                continue
+            if abs(rotation_between(directions[i], directions[j])) > tolerance:
+                turned[found] = boxes[j]
+                found += 1
+        duplicates[i] = found > 0 and new_share(boxes[i], turned[:found]) < least
+    return duplicates
+
+
 def find_duplicates(boxes: Boxes, *, least: float, tolerance: float) -> NDArray[np.bool_]:
     """Tell which rectangles are duplicates of larger ones that are none, shape (n,).
 
@@ -56,18 +82,10 @@ def find_duplicates(boxes: Boxes, *, least: float, tolerance: float) -> NDArray[
     tolerance : float
         Largest angle between rectangles that count as parallel or perpendicular, radians.
     """
+    largest_first = np.argsort(-lengths(boxes) * widths(boxes), kind="stable").astype(np.int64)
     directions = np.arctan2(boxes[:, UY], boxes[:, UX])
-    centres, radius = box_centres(boxes), np.hypot(lengths(boxes), widths(boxes)) / 2
-    stays: list[int] = []
-    for i in np.argsort(-lengths(boxes) * widths(boxes), kind="stable"):
-        turned = [
-            j
-            for j in stays
-            if math.dist(centres[i], centres[j]) < radius[i] + radius[j]
-            and abs(rotation_between(directions[i], directions[j])) > tolerance
-        ]
-        if not turned or new_share(boxes[i], boxes[turned]) >= least:
-            stays.append(int(i))
-    duplicates = np.ones(len(boxes), dtype=np.bool_)
-    duplicates[stays] = False
+    radius = np.hypot(lengths(boxes), widths(boxes)) / 2
+    duplicates: NDArray[np.bool_] = _find(
+        boxes, largest_first, directions, box_centres(boxes), radius, least, tolerance
+    )
     return duplicates
