@@ -12,8 +12,6 @@ line made lies across the sides of the one before it and so is never completely 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -62,8 +60,8 @@ def _find(
         i = order[place]
         found = 0
         for j in order[:place]:
-            apart = math.hypot(centres[i, 0] - centres[j, 0], centres[i, 1] - centres[j, 1])
-            if duplicates[j] or apart >= radius[i] + radius[j]:
+            dx, dy, reach = centres[i, 0] - centres[j, 0], centres[i, 1] - centres[j, 1], radius[i] + radius[j]
+            if duplicates[j] or dx * dx + dy * dy >= reach * reach:
                 continue
             if abs(rotation_between(directions[i], directions[j])) > tolerance:
                 turned[found] = boxes[j]
