@@ -132,11 +132,11 @@ class MPP(Detector):
     )
     texture_limit: float = parameter(3.0, minimum=0, doc="bound of that evidence, nats per m2", swept=(2, 3, 4))
     least_evidence: float = parameter(
-        0.4,
+        0.5,
         minimum=0,
         maximum=1,
         doc="least mean evidence of a building's high cells, share of texture_limit; 0: not asked",
-        swept=(0.0, 0.3, 0.4, 0.5),
+        swept=(0.0, 0.4, 0.5, 0.6),
     )
     low_price: float = parameter(5.0, minimum=0, doc="nats per m2 of low ground under a roof", swept=(2, 3, 5, 8))
     void_price: float = parameter(0.1, minimum=0, doc="nats per m2 without points under a roof", swept=(0.05, 0.1, 0.3))
