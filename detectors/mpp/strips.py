@@ -48,10 +48,11 @@ def take_in_strips(
     result = rectangles.copy()
     kept = np.ones(len(result), dtype=np.bool_)
     areas = result[:, 2:4].prod(axis=1)
-    tree = shapely.STRtree(shapely.polygons(corners(result)))
+    # The tree knows buildings as they were; none has grown by more than this.
+    tree, grown = shapely.STRtree(shapely.polygons(corners(result))), 0.0
     for strip in np.argsort(areas, kind="stable"):
         short, long = sorted(result[strip, 2:4])
-        near = tree.query(shapely.polygons(corners(result[strip]))[0], predicate="dwithin", distance=_APART)
+        near = tree.query(shapely.polygons(corners(result[strip]))[0], predicate="dwithin", distance=_APART + grown)
         near = near[kept[near] & (areas[near] > areas[strip])]
         larger = near[(long > slender * short) | (areas[strip] < part_share * areas[near])]
         if len(larger) == 0:
@@ -65,13 +66,15 @@ def take_in_strips(
         hull(result[building], result[strip], joined)
         if joined[2:4].max() > model.largest_side:
             continue
-        others = result[kept & (np.arange(len(result)) != building)]
+        around = tree.query(shapely.polygons(corners(joined))[0], predicate="dwithin", distance=grown)
+        others = result[around[kept[around] & (around != building)]]
         before, after = (
             own_energy(tables.small, tables.large, one, model)
             + model.overlap * overlaps(others, len(others), one, -1, -1)
             for one in (result[building], joined)
         )
         if after < before:
+            grown = max(grown, *(joined[2:4] - result[building, 2:4]))
             result[building], areas[building] = joined, joined[2:4].prod()
     return result[kept]
 
