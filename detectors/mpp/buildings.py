@@ -30,6 +30,8 @@ __all__ = ["outline_buildings"]
 _AS_GOOD = 0.95
 #: Metres: how far a zone reaches from its rectangle, and by how much vertices of an outline may move.
 _REACH, _STRAIGHT = 10.0, 0.05
+#: Metres: least distance of two corners. Nearer ones cross each other as soon as an outline is moved or written.
+_FINEST = 1e-6
 #: Square metres: smallest part of a building that is cut off from the rest of it.
 _SCRAP = 4.0
 
@@ -71,7 +73,7 @@ def outline_buildings(rectangles: NDArray[np.float64], blocks: NDArray[np.object
     for k in np.flatnonzero(drawn):
         rivals = tree.query(outlines[k], predicate="dwithin", distance=2 * _REACH)
         rivals = rivals[(rivals != k) & (~drawn[rivals] | (rivals < k))]
-        rest = _whole(shapely.difference(result[k], shapely.union_all(result[rivals])))
+        rest = _whole(shapely.difference(result[k], shapely.union_all(result[rivals]), grid_size=_FINEST))
         result[k] = outlines[k] if rest.is_empty else rest
     return result
 

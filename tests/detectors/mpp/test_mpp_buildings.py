@@ -42,6 +42,8 @@ def test_houses_of_a_block_meet_in_their_party_wall_and_have_all_of_it(angle):
     for k, part in enumerate(parts):
         assert part.area == pytest.approx(8.0 * 14.0, rel=0.02)
         assert part.intersection(shapely.union_all(np.delete(parts, k))).area < 1e-6
+        corners = shapely.get_coordinates(part)
+        assert np.hypot(*np.diff(corners, axis=0).T).min() > 1e-7
 
 
 def test_a_courtyard_stays_open_and_what_is_far_from_all_rectangles_belongs_to_none():
