@@ -162,6 +162,16 @@ def _tally(bins, height, first, last):  # type: ignore[no-untyped-def]
     return tally
 
 
+def _log_likelihoods(
+    rough: NDArray[np.float64], means: list[float], spreads: list[float], opens: list[NDArray[np.float64]]
+) -> list[NDArray[np.float64]]:
+    """Return the log-likelihood of each bin of roughness and openness, shape (24, 8), in each class."""
+    return [
+        -0.5 * ((rough - mean) / spread)[:, None] ** 2 - math.log(spread) + np.log(opening)[None, :]
+        for mean, spread, opening in zip(means, spreads, opens, strict=True)
+    ]
+
+
 def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Background, NDArray[np.int16]]:
     """Estimate the classes of a scene; also return the bin of each cell's texture (-1: no window holds it)."""
     bins = textures(cells.height, cells.state, cells.openness, workers=workers)
@@ -177,10 +187,7 @@ def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Back
     share = 0.5
     belongs = np.full(counts.shape, 0.5)
     for _ in range(20):
-        logs = [
-            -0.5 * ((rough - mean) / spread)[:, None] ** 2 - math.log(spread) + np.log(opening)[None, :]
-            for mean, spread, opening in zip(means, spreads, opens, strict=True)
-        ]
+        logs = _log_likelihoods(rough, means, spreads, opens)
         odds = logs[1] - logs[0] + math.log(share / (1 - share))
         belongs = 1 / (1 + np.exp(-np.clip(odds, -50, 50)))
         for k, weight in enumerate((counts * (1 - belongs), counts * belongs)):
@@ -192,10 +199,7 @@ def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Back
             spreads[k] = float(np.clip(math.sqrt(scatter / size), 0.4, 1.0))
             opens[k] = (weight.sum(axis=0) + pseudo * np.array((_ROOF_OPEN, _CROWN_OPEN)[k])) / size
         share = float(np.clip(((counts * belongs).sum() + 100) / (size_of_sample + 200), 0.02, 0.98))
-    logs = [
-        -0.5 * ((rough - mean) / spread)[:, None] ** 2 - math.log(spread) + np.log(opening)[None, :]
-        for mean, spread, opening in zip(means, spreads, opens, strict=True)
-    ]
+    logs = _log_likelihoods(rough, means, spreads, opens)
     evidence = logs[0] - logs[1]
     # A smoother window is never less of a roof: the tail of the narrower class must not turn the ratio round.
     evidence = np.minimum.accumulate(evidence, axis=0)
