@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...scenes.errors import ParameterError
 from ...scenes.footprints import Footprints
 from ...scenes.parameters import parameter
 from ...scenes.scene import Scene
@@ -159,6 +160,15 @@ class MPP(Detector):
     )
     iterations: int = parameter(30000, minimum=1, doc="T_m of the printed algorithm; the paper gives no value")
     workers: int = parameter(1, minimum=1, doc="threads; they change the time, never the result")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for low, high in (("least_side", "largest_side"), ("cold", "hot")):
+            less, more = getattr(self, low), getattr(self, high)
+            if less > more:
+                raise ParameterError(
+                    f"mpp: {low} of {less:g} is more than {high} of {more:g}: lower {low} or raise {high}"
+                )
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Return buildings with the attributes height, tau, slope (m, m, m/m), roof and energy, and the run record.

@@ -178,6 +178,12 @@ def test_rectangles_of_more_cells_than_the_sums_hold_are_refused_with_what_to_do
     assert len(detect(cloud(), "mpp[cell=0.25,largest_side=90]")) >= 3
 
 
+@pytest.mark.parametrize("crossed", ["least_side=9,largest_side=5", "hot=0.05"])
+def test_limits_that_cross_each_other_are_refused(crossed):
+    with pytest.raises(ParameterError, match="is more than"):
+        make_detector(f"mpp[{crossed}]")
+
+
 def test_without_births_from_data_the_sampler_still_finds_the_houses():
     found = detect(cloud(7), "mpp[data_births=0,start=empty,hot=30,effort=30]")
     truth = shapely.union_all([shapely.box(*roof[:4]) for roof in ROOFS])
