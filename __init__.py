@@ -14,23 +14,25 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
+from .core.package import HOMES, VERSION
+
 if TYPE_CHECKING:
     from .benchmark.session import detect, run
+    from .core.errors import RoofbenchError
+    from .core.parameters import parameter
     from .detectors.base import Detector, Step
     from .detectors.registry import make_detector
     from .evaluators.base import Evaluation, Evaluator, Index
     from .evaluators.comparison import evaluate, pool
     from .evaluators.registry import make_evaluator
-    from .scenes.errors import RoofbenchError
     from .scenes.folder import open_scene, save_scene
-    from .scenes.footprints import Footprints
-    from .scenes.importing import import_scene
-    from .scenes.parameters import parameter
-    from .scenes.points import PointCloud
-    from .scenes.raster import Elevation, Grid, Image
+    from .scenes.geodata.footprints import Footprints
+    from .scenes.geodata.points import PointCloud
+    from .scenes.geodata.raster import Elevation, Grid, Image
+    from .scenes.geodata.vector_files import read_footprints, write_footprints
+    from .scenes.importing.scene_import import import_scene
     from .scenes.scene import Scene
     from .scenes.synthetic import make_scene
-    from .scenes.vector_files import read_footprints, write_footprints
 
 # Compiled kernels go to the user's cache. Beside the modules they would outlive an uninstall, and what is left of the
 # folder then hides the package when it is installed in editable mode.
@@ -43,34 +45,6 @@ os.environ.setdefault(
     ),
 )
 
-#: Public name to the module that defines it.
-_HOMES = {
-    "Detector": "detectors.base",
-    "Elevation": "scenes.raster",
-    "Evaluation": "evaluators.base",
-    "Evaluator": "evaluators.base",
-    "Footprints": "scenes.footprints",
-    "Grid": "scenes.raster",
-    "Image": "scenes.raster",
-    "Index": "evaluators.base",
-    "PointCloud": "scenes.points",
-    "RoofbenchError": "scenes.errors",
-    "Scene": "scenes.scene",
-    "Step": "detectors.base",
-    "detect": "benchmark.session",
-    "evaluate": "evaluators.comparison",
-    "import_scene": "scenes.importing",
-    "make_detector": "detectors.registry",
-    "make_evaluator": "evaluators.registry",
-    "make_scene": "scenes.synthetic",
-    "open_scene": "scenes.folder",
-    "parameter": "scenes.parameters",
-    "pool": "evaluators.comparison",
-    "read_footprints": "scenes.vector_files",
-    "run": "benchmark.session",
-    "save_scene": "scenes.folder",
-    "write_footprints": "scenes.vector_files",
-}
 
 __all__ = [
     "Detector",
@@ -99,12 +73,12 @@ __all__ = [
     "save_scene",
     "write_footprints",
 ]
-__version__ = "0.1.0"
+__version__ = VERSION
 
 
 def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+    if name in HOMES:
+        return getattr(importlib.import_module(f".{HOMES[name]}", __name__), name)
     raise AttributeError(f"module 'roofbench' has no attribute {name!r}")
 
 

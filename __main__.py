@@ -1,6 +1,6 @@
 """``python -m roofbench``."""
 
-from .benchmark.cli.main import main
+from .cli.main import main
 
 if __name__ == "__main__":
     main()

@@ -12,17 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from ..core.errors import RoofbenchError, UnsupportedError
+from ..core.parameters import Parameterised
 from ..detectors.base import Detector
 from ..evaluators.base import Evaluation, Evaluator
 from ..scenes.builtin import hamlet
-from ..scenes.errors import RoofbenchError, UnsupportedError
-from ..scenes.footprints import Footprints
-from ..scenes.parameters import Parameterised
+from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
-from .isolation import IsolatedProcess, Limits
-from .recipes import PluginRecipe, SceneRecipe
-from .tasks import Outcome, Task
-from .worker import detect
+from .execution.isolation import IsolatedProcess, Limits
+from .execution.tasks import Outcome, Task
+from .execution.worker import detect
+from .identity.recipes import PluginRecipe, SceneRecipe
 
 __all__ = ["Check", "check_detector", "check_evaluator"]
 

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from ..core.errors import UnsupportedError
 from ..detectors.base import Detector
 from ..evaluators.base import Evaluator
-from ..scenes.errors import UnsupportedError
 from ..scenes.scene import Scene
-from .keys import source_closure
-from .recipes import PluginRecipe, SceneRecipe, code_digest, label_of
-from .records import RunIdentity, RunRow, evaluation_key
-from .store import Store
+from .identity.keys import source_closure
+from .identity.recipes import PluginRecipe, SceneRecipe, code_digest, label_of
+from .store.records import RunIdentity, RunRow, evaluation_key
+from .store.writer import Store
 from .suite import Entrant, Suite
 
 __all__ = ["Judge", "Overwrite", "Plan", "PlannedRun", "make_plan", "plan_content", "suite_from_content"]

@@ -12,16 +12,16 @@ from ..detectors.registry import make_detector
 from ..evaluators.base import Evaluator
 from ..evaluators.registry import make_evaluator
 from ..reports.tables import Leaderboard
-from ..scenes.footprints import Footprints
+from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
-from .isolation import Limits
-from .leaderboard import make_leaderboard
+from .analysis.leaderboard import make_leaderboard
+from .execution.isolation import Limits
+from .execution.runner import Execution, run_plan
+from .execution.worker import detect as _detect
+from .identity.recipes import SceneRecipe
 from .plan import Overwrite, make_plan
-from .recipes import SceneRecipe
-from .runner import Execution, run_plan
-from .store import Store
+from .store.writer import Store
 from .suite import Entrant, Suite, scenes_of
-from .worker import detect as _detect
 
 __all__ = ["detect", "run"]
 

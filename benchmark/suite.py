@@ -21,14 +21,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import InputError, ParameterError, RoofbenchError, UnknownNameError
+from ..core.registry import nearest_hint, parse_selection
 from ..detectors.base import Detector
 from ..detectors.registry import DETECTORS, make_detector
 from ..evaluators.base import Evaluator
 from ..evaluators.registry import make_evaluator
-from ..scenes.errors import InputError, ParameterError, RoofbenchError, UnknownNameError
-from ..scenes.names import nearest_hint, parse_selection
 from ..scenes.scene import Scene
-from .recipes import SceneRecipe, label_of, preset_names
+from .identity.recipes import SceneRecipe, label_of, preset_names
 
 __all__ = ["Entrant", "Suite", "named_suite", "read_suite", "scenes_of", "suite_names"]
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ..scenes.errors import UnsupportedError
-from ..scenes.footprints import Footprints
-from ..scenes.parameters import Parameterised
+from ..core.errors import UnsupportedError
+from ..core.parameters import Parameterised
+from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..scenes.crs import crs_label, same_crs
-from ..scenes.errors import InputError
-from ..scenes.footprints import Footprints
+from ..core.errors import InputError
+from ..scenes.geodata.crs import crs_label, same_crs
+from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
 
 __all__ = ["checked_output"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..scenes.names import Registry, parse_selection
+from ..core.registry import Registry, parse_selection
 from .base import Detector
 
 __all__ = ["DETECTORS", "make_detector"]
@@ -16,9 +16,9 @@ DETECTORS = Registry(
     Detector,
     {
         "improved": "detectors.lines.improved:Improved",
-        "ndsm": "detectors.ndsm:NDSM",
+        "ndsm": "detectors.ndsm.ndsm_detector:NDSM",
         "original": "detectors.lines.original:Original",
-        "mpp": "detectors.mpp.detector:MPP",
+        "mpp": "detectors.mpp.mpp_detector:MPP",
     },
 )
 

@@ -24,10 +24,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scenes.errors import InputError
-from ..scenes.footprints import Footprints
-from ..scenes.parameters import Parameterised
-from ..scenes.raster import Grid
+from ..core.errors import InputError
+from ..core.parameters import Parameterised
+from ..scenes.geodata.footprints import Footprints
+from ..scenes.geodata.raster import Grid
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,10 +7,10 @@ from typing import Any
 
 from shapely import Geometry, MultiPolygon, Polygon, is_valid, is_valid_reason
 
-from ..scenes.crs import require_metric
-from ..scenes.errors import InputError
-from ..scenes.footprints import Footprints
-from ..scenes.raster import Grid
+from ..core.errors import InputError
+from ..scenes.geodata.crs import require_metric
+from ..scenes.geodata.footprints import Footprints
+from ..scenes.geodata.raster import Grid
 from .base import Evaluation, Evaluator
 from .registry import make_evaluator
 

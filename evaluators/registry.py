@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..scenes.names import Registry, parse_selection
+from ..core.registry import Registry, parse_selection
 from .base import Evaluator
 
 __all__ = ["EVALUATORS", "make_evaluator"]

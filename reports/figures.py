@@ -7,8 +7,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from ..scenes.errors import OutputError
-from ..scenes.output import whole_file
+from ..core.errors import OutputError
+from ..core.output import whole_file
 
 __all__ = ["check_picture", "save_figure"]
 

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import InputError
 from ..evaluators.base import Index
 from ..evaluators.registry import EVALUATORS
-from ..scenes.errors import InputError
 from .gate_text import GateResult, IndexVerdict
 
 __all__ = ["read_gate"]

@@ -11,13 +11,14 @@ import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module, resources
+from importlib import resources
 from itertools import groupby
 from typing import Any
 
 import jinja2
 from markupsafe import Markup, escape
 
+from ..core.package import VERSION
 from ..evaluators.base import Index
 from .charts import cost_figure, size_figure
 from .inline_svg import to_inline_svg
@@ -60,7 +61,7 @@ def html_report(report: Report, *, level: float = 0.8) -> str:
         script=Markup(script),  # noqa: S704 - our own file
         script_hash=f"sha256-{digest}",
         data=jinja2.utils.htmlsafe_json_dumps(report_json(report), separators=(",", ":"), allow_nan=False),
-        version=import_module(__package__.rpartition(".")[0]).__version__,
+        version=VERSION,
         level=level,
         cell_text=format_cell,
         percent_text=_percent_text,

@@ -20,10 +20,10 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..detectors.scale_bar import add_scale_bar
-from ..scenes.crs import crs_label
-from ..scenes.raster import Elevation, Grid
+from ..scenes.geodata.crs import crs_label
+from ..scenes.geodata.raster import Elevation, Grid
+from ..scenes.geodata.surfaces import highest_surface, mean_intensity
 from ..scenes.scene import Scene
-from ..scenes.surfaces import highest_surface, mean_intensity
 from .verdict_map import outlines
 
 __all__ = ["scene_figure"]

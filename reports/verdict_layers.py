@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..evaluators.base import Verdicts
-from ..scenes.vector_files import write_layers
+from ..scenes.geodata.vector_files import write_layers
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .footprints import Footprints
-from .points import PointCloud
-from .raster import Elevation, Grid, Image
+from .geodata.footprints import Footprints
+from .geodata.points import PointCloud
+from .geodata.raster import Elevation, Grid, Image
 from .scene import Scene
 
 __all__ = ["hamlet"]

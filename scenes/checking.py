@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .crs import crs_label, same_crs
-from .errors import RoofbenchError
+from ..core.errors import RoofbenchError
 from .folder import FILES, changed_files, open_scene, read_manifest
-from .footprints import Footprints
-from .points import PointCloud
-from .raster import Elevation, Grid, Image
+from .geodata.crs import crs_label, same_crs
+from .geodata.footprints import Footprints
+from .geodata.points import PointCloud
+from .geodata.raster import Elevation, Grid, Image
 from .scene import Scene
 
 __all__ = ["SceneReport", "check_scene"]
@@ -175,14 +175,14 @@ def _crs_problems(file: Path, kind: str, expected: str | None) -> list[str]:
 
 def _file_crs(file: Path, kind: str) -> str | None:
     if kind == "points":
-        from .las_files import read_las_header
+        from .geodata.las_files import read_las_header
 
         return read_las_header(file).crs
     if kind in ("image", "dem"):
-        from .raster_files import read_raster_header
+        from .geodata.raster_files import read_raster_header
 
         return read_raster_header(file).crs
-    from .vector_files import read_footprints
+    from .geodata.vector_files import read_footprints
 
     return read_footprints(file).crs
 

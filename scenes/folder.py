@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .crs import require_metric
-from .errors import CRSError, InputError
-from .footprints import Footprints
-from .output import whole_folder
-from .points import PointCloud
-from .raster import Elevation, Image
+from ..core.errors import CRSError, InputError
+from ..core.output import whole_folder
+from .geodata.crs import require_metric
+from .geodata.footprints import Footprints
+from .geodata.points import PointCloud
+from .geodata.raster import Elevation, Image
 from .scene import Scene
 
 __all__ = ["FILES", "HOLDS", "MANIFEST", "changed_files", "open_scene", "read_manifest", "save_scene", "seal_scene"]
@@ -94,15 +94,15 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, overwrite: bool = 
     """
     with whole_folder(path, holds=HOLDS, overwrite=overwrite) as folder:
         if scene.points is not None:
-            from .las_files import write_points
+            from .geodata.las_files import write_points
 
             write_points(scene.points, folder / FILES["points"], crs=scene.crs)
         if scene.image is not None:
-            from .raster_files import write_image
+            from .geodata.raster_files import write_image
 
             write_image(scene.image, folder / FILES["image"], crs=scene.crs)
         if scene.dem is not None:
-            from .raster_files import write_elevation
+            from .geodata.raster_files import write_elevation
 
             write_elevation(scene.dem, folder / FILES["dem"], crs=scene.crs)
         if scene.reference is not None:
@@ -227,27 +227,27 @@ def _reader(kind: str, file: Path, manifest: Mapping[str, Any]) -> Any:
     """Return the function that reads one file of a scene."""
 
     def points() -> PointCloud:
-        from .las_files import read_points
+        from .geodata.las_files import read_points
 
         return read_points(file)
 
     def image() -> Image:
-        from .raster_files import read_image
+        from .geodata.raster_files import read_image
 
         return read_image(file, bands=manifest["files"]["image"].get("bands"))
 
     def dem() -> Elevation:
-        from .raster_files import read_elevation
+        from .geodata.raster_files import read_elevation
 
         return read_elevation(file)
 
     def reference() -> Footprints:
-        from .vector_files import read_footprints
+        from .geodata.vector_files import read_footprints
 
         return read_footprints(file)
 
     def area() -> shapely.Geometry:
-        from .vector_files import read_footprints
+        from .geodata.vector_files import read_footprints
 
         return shapely.union_all(read_footprints(file).polygons)
 
@@ -255,7 +255,7 @@ def _reader(kind: str, file: Path, manifest: Mapping[str, Any]) -> Any:
 
 
 def _write_reference(reference: Footprints, file: Path, crs: str | None) -> None:
-    from .vector_files import write_layers
+    from .geodata.vector_files import write_layers
 
     columns: dict[str, Any] = dict(reference.attributes)
     # Always there, so that a person who opens the file sees that parts can share one.
@@ -266,7 +266,7 @@ def _write_reference(reference: Footprints, file: Path, crs: str | None) -> None
 
 
 def _write_area(area: shapely.Geometry, file: Path, crs: str | None) -> None:
-    from .vector_files import write_layers
+    from .geodata.vector_files import write_layers
 
     write_layers({"area": (np.array([area], dtype=object), {"id": np.array([0])})}, file, crs=crs)
 
@@ -274,7 +274,7 @@ def _write_area(area: shapely.Geometry, file: Path, crs: str | None) -> None:
 def _write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
     import tomli_w
 
-    from .output import whole_file
+    from ..core.output import whole_file
 
     with whole_file(folder / MANIFEST, overwrite=True) as scratch:
         scratch.write_text(tomli_w.dumps(manifest), encoding="utf-8")

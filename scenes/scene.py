@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .errors import InputError, MissingInputError
-from .footprints import Footprints
-from .points import PointCloud
-from .raster import Elevation, Grid, Image
+from ..core.errors import InputError, MissingInputError
+from .geodata.footprints import Footprints
+from .geodata.points import PointCloud
+from .geodata.raster import Elevation, Grid, Image
 
 __all__ = ["Scene"]
 

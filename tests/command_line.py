@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from unittest import mock
 
-from roofbench.benchmark.cli.main import main
+from roofbench.cli.main import main
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from roofbench.scenes.points import PointCloud
-from roofbench.scenes.raster import Elevation, Grid, Image
+from roofbench.scenes.geodata.points import PointCloud
+from roofbench.scenes.geodata.raster import Elevation, Grid, Image
 from roofbench.scenes.scene import Scene
 
 RED_ROOF = (170, 75, 60)

@@ -16,11 +16,13 @@ PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text
 
 #: Room to the rooms that it may import from.
 FLOORS = {
-    "scenes": {"scenes"},
-    "evaluators": {"evaluators", "scenes"},
-    "detectors": {"detectors", "scenes"},
-    "reports": {"reports", "evaluators", "detectors", "scenes"},
-    "benchmark": {"benchmark", "reports", "evaluators", "detectors", "scenes"},
+    "core": {"core"},
+    "scenes": {"scenes", "core"},
+    "evaluators": {"evaluators", "scenes", "core"},
+    "detectors": {"detectors", "scenes", "core"},
+    "reports": {"reports", "evaluators", "detectors", "scenes", "core"},
+    "benchmark": {"benchmark", "reports", "evaluators", "detectors", "scenes", "core"},
+    "cli": {"cli", "benchmark", "reports", "evaluators", "detectors", "scenes", "core"},
 }
 
 

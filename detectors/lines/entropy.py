@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ...scenes.raster import Image
+from ...scenes.geodata.raster import Image
 
 __all__ = ["WINDOW", "grey_levels", "local_entropy"]
 

@@ -13,14 +13,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.parameters import parameter
-from ...scenes.raster import Image
+from ...core.parameters import parameter
+from ...scenes.geodata.raster import Image
 from .adjustment import adjust_to_neighbours, adjust_to_shape
 from .boxes import Boxes, lengths, prefix_sums
-from .detector import PAPER_PIXEL, LineDetector
 from .entropy import grey_levels, local_entropy
 from .extension import band, mean_in_boxes
 from .image_edges import ImageEdges, extract_edges
+from .line_detector import PAPER_PIXEL, LineDetector
 from .rasters import Rasters
 from .segments import Segments
 from .texture import Texture, judge

@@ -34,8 +34,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.points import PointCloud
-from ...scenes.raster import Elevation, Grid
+from ...scenes.geodata.points import PointCloud
+from ...scenes.geodata.raster import Elevation, Grid
 
 __all__ = ["Masks", "build_masks", "ground_heights", "point_spacing", "sunken"]
 

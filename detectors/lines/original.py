@@ -13,11 +13,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.parameters import parameter
+from ...core.parameters import parameter
 from .adjustment import adjust_to_neighbours
 from .boxes import Boxes
-from .detector import LineDetector
 from .extension import band, mean_in_boxes
+from .line_detector import LineDetector
 from .rasters import Rasters
 from .segments import Segments
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...scenes.raster import Image
+from ...scenes.geodata.raster import Image
 from .colours import Colours
 from .extension import Cover
 from .masks import Masks

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.raster import Grid, Image
+from ...scenes.geodata.raster import Grid, Image
 from .boxes import Boxes
 from .masks import Masks
 from .texture import Texture

@@ -20,10 +20,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...scenes.raster import Grid
-from ..morphology import closed, opened, without_holes
-from ..outlines import coverage_of_mask, trace
-from ..regularise import regularise
+from ...scenes.geodata.raster import Grid
+from ..shared.morphology import closed, opened, without_holes
+from ..shared.outlines import coverage_of_mask, trace
+from ..shared.regularise import regularise
 from .cells import HIGH, LOW
 from .rectangles import inside_any
 

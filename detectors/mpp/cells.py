@@ -28,9 +28,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ...scenes.lowest_points import coverage
-from ...scenes.points import PointCloud
-from ...scenes.raster import Elevation, Grid
+from ...scenes.geodata.points import PointCloud
+from ...scenes.geodata.raster import Elevation, Grid
+from ...scenes.ground.lowest_points import coverage
 from .workers import ALONE, Workers
 
 __all__ = ["HIGH", "LOW", "VOID", "Cells", "cell_size", "make_cells"]

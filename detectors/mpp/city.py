@@ -21,7 +21,7 @@ from .walls import close_walls
 from .workers import Workers
 
 if TYPE_CHECKING:
-    from .detector import MPP
+    from .mpp_detector import MPP
 
 __all__ = ["join_traces", "sample_city", "total_energy"]
 

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...scenes.footprints import Footprints
+from ...scenes.geodata.footprints import Footprints
 from .blocks import outline_blocks
 from .buildings import outline_buildings
 from .energy import ground_variance

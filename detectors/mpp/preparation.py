@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.errors import ParameterError
-from ...scenes.ground import fill_unknown, ground_surface
-from ...scenes.points import PointCloud
-from ...scenes.raster import Elevation, Grid
+from ...core.errors import ParameterError
+from ...scenes.geodata.points import PointCloud
+from ...scenes.geodata.raster import Elevation, Grid
+from ...scenes.ground.filter import fill_unknown, ground_surface
 from ...scenes.scene import Scene
 from .background import Background, estimate_background, fitted_cells, score_cells, textures
 from .candidates import propose_boxes
@@ -28,7 +28,7 @@ from .tables import LONGEST, TALLEST, Tables, make_tables
 from .workers import Workers
 
 if TYPE_CHECKING:
-    from .detector import MPP
+    from .mpp_detector import MPP
 
 __all__ = ["Prepared", "prepare"]
 

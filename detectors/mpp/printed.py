@@ -17,14 +17,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ...scenes.points import PointCloud
+from ...scenes.geodata.points import PointCloud
 from .cells import HIGH
 from .preparation import Prepared
 from .random_stream import gaussian, integer, stream, uniform
 from .rectangles import row_span
 
 if TYPE_CHECKING:
-    from .detector import MPP
+    from .mpp_detector import MPP
 
 __all__ = ["run_printed", "sample_printed"]
 

@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ...scenes.raster import Grid
+from ...scenes.geodata.raster import Grid
 
 __all__ = ["corners", "inside_any", "overlap_area", "row_span", "to_grid_frame", "to_world"]
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.raster import Grid
+from ...scenes.geodata.raster import Grid
 from .workers import ALONE, Workers
 
 __all__ = ["Tile", "tiles_of", "work_off"]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .overlap import Overlaps
+from ..overlay.overlaps import Overlaps
 
 __all__ = ["DECIMALS", "MATCHINGS", "Correspondence", "match"]
 

@@ -16,18 +16,18 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...scenes.crs import common_crs
-from ...scenes.errors import InputError
-from ...scenes.footprints import Footprints
-from ...scenes.parameters import parameter
-from ...scenes.raster import Grid
+from ...core.errors import InputError
+from ...core.parameters import parameter
+from ...scenes.geodata.crs import common_crs
+from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.raster import Grid
 from ..base import Evaluation, Evaluator, Index, Samples, Tallies, Verdicts
-from .areas import AreaTally, exact_areas
+from ..overlay.areas import AreaTally, exact_areas
+from ..overlay.outline_distances import pair_distances
+from ..overlay.overlaps import Overlaps, common_ground, overlaps_between, overlaps_within, shared_areas
+from ..overlay.pixels import pixel_areas
 from .correspondence import MATCHINGS, Correspondence, match
-from .geometric import pair_distances
 from .indices import COUNTS, INDICES, index_values
-from .overlap import Overlaps, common_ground, overlaps_between, overlaps_within, shared_areas
-from .pixels import pixel_areas
 from .verdicts import ObjectGraph, verdict_tables
 
 __all__ = ["ThresholdFree", "ThresholdFreeEvaluation"]

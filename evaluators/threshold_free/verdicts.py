@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.footprints import Footprints
+from ...scenes.geodata.footprints import Footprints
 from ..base import Verdicts
+from ..overlay.overlaps import Overlaps
 from .correspondence import DECIMALS, Correspondence
-from .overlap import Overlaps
 
 __all__ = ["ObjectGraph", "verdict_tables"]
 

@@ -12,8 +12,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ..errors import ParameterError
-from ..raster import Elevation
+from ...core.errors import ParameterError
+from ..geodata.raster import Elevation
 from .entities import count_entities
 from .houses import compose_house
 from .layout import HALLS, TOWERS

@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster import Elevation
+from ..geodata.raster import Elevation
 from .recipe import SceneParameters
 from .streams import stream
 

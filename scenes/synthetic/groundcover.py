@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..raster import Grid
+from ..geodata.raster import Grid
 from .clutter import Cover
 from .layout import FIELDS, HALLS, PARK, TOWERS, zone_of
 from .parcels import HALL_WIDTH

@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..raster import Elevation, Grid
+from ..geodata.raster import Elevation, Grid
 from .recipe import SceneParameters
 from .streams import counter_key, fractal_field, stream, uniform
 

@@ -22,8 +22,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..points import PointCloud
-from ..raster import Grid
+from ..geodata.points import PointCloud
+from ..geodata.raster import Grid
 from .clutter import Cover
 from .groundcover import cover_codes
 from .palettes import GROUND, LAWNS

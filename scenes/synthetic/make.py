@@ -5,15 +5,15 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ParameterError
+from ...core.errors import ParameterError
 from ..scene import Scene
 from .presets import preset
 from .recipe import SceneParameters
 
 if TYPE_CHECKING:
-    from ..footprints import Footprints
-    from ..points import PointCloud
-    from ..raster import Elevation, Image
+    from ..geodata.footprints import Footprints
+    from ..geodata.points import PointCloud
+    from ..geodata.raster import Elevation, Image
     from .world import World
 
 __all__ = ["GENERATOR", "make_scene", "scene_of"]

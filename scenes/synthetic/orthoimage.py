@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..raster import Grid, Image
+from ..geodata.raster import Grid, Image
 from .camera import camera_position, registration_offset
 from .groundcover import cover_codes
 from .lighting import AMBIENT, HAZE, colour_surface, sun_vector

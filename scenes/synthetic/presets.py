@@ -52,8 +52,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..errors import UnknownNameError
-from ..names import nearest_hint
+from ...core.errors import UnknownNameError
+from ...core.registry import nearest_hint
 from .recipe import SceneParameters
 
 __all__ = ["preset", "preset_names"]

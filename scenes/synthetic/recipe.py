@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import ParameterError
-from ..parameters import Parameterised, parameter
+from ...core.errors import ParameterError
+from ...core.parameters import Parameterised, parameter
 
 __all__ = ["MOST_TREES", "SceneParameters"]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..footprints import Footprints
+from ..geodata.footprints import Footprints
 from .camera import appearance
 from .entities import entities
 from .solids import Body

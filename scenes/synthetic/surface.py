@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..raster import Grid
+from ..geodata.raster import Grid
 from .solids import Body
 from .world import World, ground_at
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..ground import fill_unknown
-from ..raster import Elevation, Grid
+from ..geodata.raster import Elevation, Grid
+from ..ground.filter import fill_unknown
 from .streams import fractal_field, stream
 from .surface import rasterise
 from .world import World

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster import Elevation, Grid
+from ..geodata.raster import Elevation, Grid
 from .recipe import SceneParameters
 from .solids import Solid
 from .streams import fractal_field, stream

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..raster import Elevation
+from ..geodata.raster import Elevation
 from .layout import FIELDS, Layout, locate, zone_of
 from .palettes import PALETTES, draw_colour
 from .recipe import MOST_TREES, SceneParameters

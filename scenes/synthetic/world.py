@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..raster import Elevation
+from ..geodata.raster import Elevation
 from .buildings import build
 from .clutter import patch_table, scatter
 from .layout import Layout, plan_layout

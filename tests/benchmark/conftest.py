@@ -2,10 +2,10 @@ from pathlib import Path
 
 import pytest
 
-from roofbench.benchmark.recipes import PluginRecipe, SceneRecipe
-from roofbench.benchmark.tasks import Task
+from roofbench.benchmark.execution.tasks import Task
+from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 
-MISBEHAVING = f"{Path(__file__).parent / 'plugins' / 'misbehaving.py'}:Misbehaving"
+MISBEHAVING = f"{Path(__file__).parents[1] / 'plugins' / 'misbehaving.py'}:Misbehaving"
 
 
 @pytest.fixture

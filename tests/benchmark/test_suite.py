@@ -1,7 +1,7 @@
 import pytest
 
 from roofbench.benchmark.suite import named_suite, read_suite, scenes_of, suite_names
-from roofbench.scenes.errors import RoofbenchError
+from roofbench.core.errors import RoofbenchError
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 import shapely
 
 import roofbench as rb
-from roofbench.scenes.errors import CRSError, InputError
+from roofbench.core.errors import CRSError, InputError
 
 HOUSE = shapely.box(0, 0, 10, 10)
 HOUSES = rb.Footprints.of([HOUSE])

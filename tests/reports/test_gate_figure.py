@@ -2,11 +2,11 @@
 
 import pytest
 
+from roofbench.core.errors import InputError
 from roofbench.evaluators.threshold_free.indices import INDICES
 from roofbench.reports.gate_figure import gate_figure
 from roofbench.reports.gate_json import read_gate
 from roofbench.reports.gate_text import GateResult, IndexVerdict, format_gate
-from roofbench.scenes.errors import InputError
 
 VERDICTS = ("better", "worse", "equal", "undecided", "not measurable")
 

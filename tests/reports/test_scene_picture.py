@@ -8,8 +8,8 @@ from PIL import Image as Bitmap
 
 from roofbench.reports.scene_picture import ScenePicture, scene_picture
 from roofbench.scenes.builtin import hamlet
-from roofbench.scenes.points import PointCloud
-from roofbench.scenes.raster import Elevation, Grid, Image
+from roofbench.scenes.geodata.points import PointCloud
+from roofbench.scenes.geodata.raster import Elevation, Grid, Image
 from roofbench.scenes.scene import Scene
 
 

@@ -8,8 +8,8 @@ from command_line import run
 
 import roofbench as rb
 from roofbench.scenes.checking import check_scene
-from roofbench.scenes.las_files import write_points
-from roofbench.scenes.raster_files import write_elevation, write_image
+from roofbench.scenes.geodata.las_files import write_points
+from roofbench.scenes.geodata.raster_files import write_elevation, write_image
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import shapely
 import small_scenes
 
 import roofbench as rb
+from roofbench.core.errors import InputError, OutputError
 from roofbench.scenes import folder
-from roofbench.scenes.errors import InputError, OutputError
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 import roofbench as rb
-from roofbench.scenes.importing import import_scene
+from roofbench.scenes.importing.scene_import import import_scene
 
 SHARED = Path(os.environ.get("ROOFBENCH_SHARED") or Path(rb.__file__).parent.parent / "shared" / "scenes")
 DELFT, IGN = SHARED / "delft-ahn3", SHARED / "ign-870200-colour"

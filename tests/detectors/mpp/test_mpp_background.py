@@ -8,7 +8,7 @@ from roofbench.detectors.mpp.background import Background, estimate_background, 
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, Cells, cell_size
 from roofbench.detectors.mpp.rectangles import inside_any
 from roofbench.detectors.mpp.workers import some_workers
-from roofbench.scenes.raster import Grid
+from roofbench.scenes.geodata.raster import Grid
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from roofbench.detectors.mpp.buildings import outline_buildings
-from roofbench.scenes.raster import Grid
+from roofbench.scenes.geodata.raster import Grid
 
 GRID = Grid(1000.0, 2000.0, 0.5, 200, 200)
 

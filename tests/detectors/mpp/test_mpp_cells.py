@@ -6,8 +6,8 @@ import pytest
 
 from roofbench.detectors.mpp.cells import make_cells
 from roofbench.detectors.mpp.workers import some_workers
-from roofbench.scenes.points import PointCloud
-from roofbench.scenes.raster import Elevation, Grid
+from roofbench.scenes.geodata.points import PointCloud
+from roofbench.scenes.geodata.raster import Elevation, Grid
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 7])

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import shapely
 
+from roofbench.core.errors import ParameterError
 from roofbench.detectors.mpp.tiles import tiles_of
 from roofbench.detectors.registry import make_detector
-from roofbench.scenes.errors import ParameterError
-from roofbench.scenes.points import PointCloud
-from roofbench.scenes.raster import Elevation, Grid
+from roofbench.scenes.geodata.points import PointCloud
+from roofbench.scenes.geodata.raster import Elevation, Grid
 from roofbench.scenes.scene import Scene
 
 EXTENT = (1000.0, 2000.0, 1120.0, 2090.0)

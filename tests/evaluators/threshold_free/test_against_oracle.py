@@ -8,7 +8,7 @@ from random_sets import footprints_on_a_lattice, random_detections, random_refer
 
 import roofbench as rb
 from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
-from roofbench.scenes.raster import Grid
+from roofbench.scenes.geodata.raster import Grid
 
 
 def scene(seed, *, general):
@@ -46,8 +46,8 @@ def test_counts_are_equal_and_areas_agree_to_nine_digits(block, general, matchin
 
 @pytest.mark.parametrize("seed", range(20))
 def test_large_outlines_cut_into_pieces_share_the_same_areas(seed, monkeypatch):
-    monkeypatch.setattr("roofbench.evaluators.threshold_free.overlap._MANY_VERTICES", 6)
-    monkeypatch.setattr("roofbench.evaluators.threshold_free.overlap._FEW_PAIRS", 1)
+    monkeypatch.setattr("roofbench.evaluators.overlay.overlaps._MANY_VERTICES", 6)
+    monkeypatch.setattr("roofbench.evaluators.overlay.overlaps._FEW_PAIRS", 1)
     detected, reference, building = scene(seed, general=True)
     evaluation = ThresholdFree().evaluate(footprints(detected), footprints(reference, building))
     assert_same(evaluation, naive.evaluate(detected, reference, building))
@@ -125,7 +125,7 @@ def test_pixel_areas_count_the_pixel_centres_inside(seed):
 def test_pixel_areas_in_many_bands_are_those_in_one(monkeypatch):
     detected, reference, _ = scene(4, general=True)
     whole = ThresholdFree(area="pixels", gsd=0.05).evaluate(footprints(detected), footprints(reference))
-    monkeypatch.setattr("roofbench.evaluators.threshold_free.pixels._BAND_CROSSINGS", 97)
+    monkeypatch.setattr("roofbench.evaluators.overlay.pixels._BAND_CROSSINGS", 97)
     banded = ThresholdFree(area="pixels", gsd=0.05).evaluate(footprints(detected), footprints(reference))
     assert banded.tallies == whole.tallies
 

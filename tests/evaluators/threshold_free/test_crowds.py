@@ -5,9 +5,9 @@ import pytest
 import shapely
 
 import roofbench as rb
-from roofbench.evaluators.threshold_free import overlap
-from roofbench.evaluators.threshold_free.overlap import overlaps_between, overlaps_within
-from roofbench.scenes.errors import InputError
+from roofbench.core.errors import InputError
+from roofbench.evaluators.overlay import overlaps as overlap
+from roofbench.evaluators.overlay.overlaps import overlaps_between, overlaps_within
 
 HOUSE = shapely.box(0, 0, 10, 8)
 ROUND = shapely.Point(5, 4).buffer(4)

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from roofbench.scenes.raster import Elevation, Grid
+from roofbench.scenes.geodata.raster import Elevation, Grid
 from roofbench.scenes.synthetic.camera import camera_position
 from roofbench.scenes.synthetic.lidar import scan
 from roofbench.scenes.synthetic.lighting import sun_vector, sunlit

@@ -3,7 +3,7 @@
 import pytest
 
 import roofbench as rb
-from roofbench.scenes.errors import ParameterError, UnknownNameError
+from roofbench.core.errors import ParameterError, UnknownNameError
 from roofbench.scenes.synthetic import SceneParameters
 
 

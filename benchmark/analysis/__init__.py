@@ -1,0 +1,1 @@
+"""Analysis: what stored results amount to."""

@@ -1,0 +1,258 @@
+"""Baselines: what a version of the code reached on every scene, as a small JSON file that lives in git.
+
+It holds no detections, only index values by detector, scene and seed, with the content hash of each scene and the
+recipes that repeat them. Values are rounded to nine decimals, on both sides of a comparison, and one line per scene and
+seed makes a change readable in a diff.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Self
+
+from ...core.errors import InputError, ParameterError, UnknownNameError
+from ...core.output import whole_file
+from ...core.registry import nearest_hint
+from ...evaluators.base import Evaluator
+from ..identity.provenance import CodeVersion
+from ..identity.recipes import PluginRecipe, SceneRecipe
+from ..plan import Judge
+from ..store.records import RunRow
+from ..store.writer import Store
+from ..suite import Entrant, Suite
+
+__all__ = ["Baseline", "BaselineScene", "Measured", "measure"]
+
+_FORMAT = 1
+_DECIMALS = 9
+
+
+@dataclass(frozen=True)
+class BaselineScene:
+    """A scene of a baseline: how it is opened, and what it held."""
+
+    recipe: SceneRecipe
+    content_hash: str
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What one detector reached: status and values of every run by scene and seed.
+
+    Attributes
+    ----------
+    recipe : PluginRecipe
+    seeds : tuple of int
+    runs : mapping of (scene, seed) to mapping or None
+        Index values by key (None where undefined); None for a run that failed or was skipped.
+    """
+
+    recipe: PluginRecipe
+    seeds: tuple[int, ...]
+    runs: Mapping[tuple[str, int], Mapping[str, float | None] | None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baseline:
+    """What a version of the code reached.
+
+    Attributes
+    ----------
+    suite : str
+    version : CodeVersion
+    created : str
+        UTC, ISO 8601.
+    evaluator : PluginRecipe
+    scenes : mapping of str to BaselineScene
+    detectors : mapping of str to Measured
+        By label.
+    """
+
+    suite: str
+    version: CodeVersion
+    created: str
+    evaluator: PluginRecipe
+    scenes: Mapping[str, BaselineScene]
+    detectors: Mapping[str, Measured]
+
+    def to_suite(self) -> Suite:
+        """Return the suite that repeats it."""
+        entrants = tuple(Entrant(found.recipe.detector(), found.seeds) for found in self.detectors.values())
+        scenes = tuple(scene.recipe for scene in self.scenes.values())
+        return Suite(self.suite, scenes, entrants, (self.evaluator.evaluator(),))
+
+    def counterparts(self, labels: Sequence[str]) -> dict[str, str]:
+        """Return for each of these detectors the label of the one here that it is compared with.
+
+        That of the same label, else the only one of that name: ``ndsm[height=2]`` is compared with ``ndsm``. One
+        detector alone is compared with the one that is alone here, whatever they are called. A detector that has no
+        counterpart is left out.
+
+        Raises
+        ------
+        ParameterError
+            Two of them would be compared with the same.
+        """
+        if len(labels) == len(self.detectors) == 1:
+            return dict(zip(labels, self.detectors, strict=True))
+        found: dict[str, str] = {}
+        for label in labels:
+            name = label.partition("[")[0]
+            same = [known for known in self.detectors if known.partition("[")[0] == name]
+            if label in self.detectors or len(same) == 1:
+                found[label] = label if label in self.detectors else same[0]
+        if len(set(found.values())) < len(found):
+            raise ParameterError(f"{', '.join(found)}: each detector of a baseline can be compared with one only")
+        return found
+
+    def with_labels_of(self, other: Baseline) -> Baseline:
+        """Return this one with detectors named as their counterparts in `other`."""
+        named = other.counterparts(list(self.detectors))
+        return replace(self, detectors={named.get(label, label): found for label, found in self.detectors.items()})
+
+    def only(self, labels: Iterable[str]) -> Baseline:
+        """Return this one with these detectors only, or raise `UnknownNameError`."""
+        for label in (labels := list(labels)):
+            if label not in self.detectors:
+                raise UnknownNameError(
+                    f"the baseline has no detector {label!r}{nearest_hint(label, self.detectors)}; "
+                    f"it has {', '.join(self.detectors)}"
+                )
+        return replace(self, detectors={label: self.detectors[label] for label in labels})
+
+    def with_scenes(self, pattern: str) -> Baseline:
+        """Return this one with only the scenes whose name matches a pattern such as ``knox*``."""
+        kept = {scene.name for scene in self.to_suite().with_scenes(pattern).scenes}
+        return replace(
+            self,
+            scenes={name: scene for name, scene in self.scenes.items() if name in kept},
+            detectors={
+                label: replace(found, runs={run: values for run, values in found.runs.items() if run[0] in kept})
+                for label, found in self.detectors.items()
+            },
+        )
+
+    def to_json(self) -> str:
+        """Return the file's text: one line per scene, and per detector, scene and seed."""
+        head = {
+            "format": _FORMAT,
+            "suite": self.suite,
+            "created": self.created,
+            "roofbench": {"version": self.version.version, "commit": self.version.commit},
+            "evaluator": self.evaluator.to_dict(),
+        }
+        lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in head.items()]
+        scenes = [
+            f"    {json.dumps(name)}: {json.dumps({'hash': scene.content_hash, **scene.recipe.to_dict()})}"
+            for name, scene in self.scenes.items()
+        ]
+        detectors = []
+        for label, measured in self.detectors.items():
+            runs = [
+                f"        {json.dumps([scene, seed, None if values is None else dict(values)])}"
+                for (scene, seed), values in sorted(measured.runs.items())
+            ]
+            told = {**measured.recipe.to_dict(), "seeds": list(measured.seeds)}
+            body = [f"      {json.dumps(name)}: {json.dumps(value)}," for name, value in told.items()]
+            listed = ",\n".join(runs)
+            text = "\n".join([*body, f'      "runs": [\n{listed}\n      ]'])
+            detectors.append(f"    {json.dumps(label)}: {{\n{text}\n    }}")
+        parts = [*lines, '  "scenes": {', ",\n".join(scenes), "  },", '  "detectors": {', ",\n".join(detectors), "  }"]
+        return "{\n" + "\n".join(parts) + "\n}\n"
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the file, whole or not at all."""
+        with whole_file(path, overwrite=overwrite) as scratch:
+            scratch.write_text(self.to_json(), encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a file that `save` wrote.
+
+        Raises
+        ------
+        InputError
+            Missing file, or one that is no baseline of a known format.
+        """
+        file = Path(path)
+        if not file.is_file():
+            raise InputError(f"{file}: no such baseline; make one with roofbench baseline save -o {file}")
+        try:
+            content = json.loads(file.read_text(encoding="utf-8"))
+            if content["format"] != _FORMAT:
+                raise InputError(f"{file}: baseline of format {content['format']}, this roofbench knows {_FORMAT}")
+            return cls._from(content)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            if isinstance(error, InputError):
+                raise
+            missing = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+            raise InputError(f"{file} is no baseline ({missing}): 'roofbench baseline save' makes one") from error
+
+    @classmethod
+    def _from(cls, content: Mapping[str, Any]) -> Self:
+        scenes = {}
+        for name, values in content["scenes"].items():
+            recipe = {key: value for key, value in values.items() if key != "hash"}
+            scenes[name] = BaselineScene(SceneRecipe.from_dict(recipe), values["hash"])
+        detectors = {
+            label: Measured(
+                PluginRecipe(values["use"], values["parameters"]),
+                tuple(values["seeds"]),
+                {(scene, seed): found for scene, seed, found in values["runs"]},
+            )
+            for label, values in content["detectors"].items()
+        }
+        roofbench = content["roofbench"]
+        return cls(
+            suite=content["suite"],
+            version=CodeVersion(roofbench["version"], roofbench["commit"], False),
+            created=content["created"],
+            evaluator=PluginRecipe(**content["evaluator"]),
+            scenes=scenes,
+            detectors=detectors,
+        )
+
+
+def measure(suite: Suite, rows: Sequence[RunRow], store: Store, judge: Judge, version: CodeVersion) -> Baseline:
+    """Return what stored runs of a suite reached."""
+    values = store.index_values([row.id for row in rows if row.status == "ok"], judge.key)
+    scenes: dict[str, BaselineScene] = {}
+    for row in rows:
+        if row.scene not in scenes:
+            scene = store.scene(row.scene_id)
+            if scene.content_hash is not None and scene.reference is not None:
+                scenes[row.scene] = BaselineScene(_portable(scene.recipe), scene.content_hash)
+    detectors = {}
+    for entrant in suite.entrants:
+        runs: dict[tuple[str, int], Mapping[str, float | None] | None] = {}
+        for row in rows:
+            if row.label == entrant.label and row.scene in scenes:
+                found = values.get(row.id)
+                runs[row.scene, row.seed] = None if found is None else _rounded(found, judge.evaluator)
+        detectors[entrant.label] = Measured(PluginRecipe.of(entrant.detector), entrant.seeds, runs)
+    return Baseline(
+        suite=suite.name,
+        version=version,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        evaluator=judge.recipe,
+        scenes=scenes,
+        detectors=detectors,
+    )
+
+
+def _rounded(values: Mapping[str, float | None], evaluator: Evaluator) -> dict[str, float | None]:
+    """Return the values in the evaluator's order, rounded."""
+    found = {index.key: values.get(index.key) for index in evaluator.indices}
+    return {key: None if value is None else round(value, _DECIMALS) for key, value in found.items()}
+
+
+def _portable(recipe: SceneRecipe) -> SceneRecipe:
+    """Return the recipe with a folder below the working directory as a relative path, for other machines."""
+    place = Path(recipe.place)
+    if recipe.kind == "folder" and place.is_relative_to(Path.cwd()):
+        return replace(recipe, place=str(place.relative_to(Path.cwd())))
+    return recipe

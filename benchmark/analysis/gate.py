@@ -1,0 +1,244 @@
+"""The gate: whether a change of the code has made a detector worse.
+
+Candidate and baseline are paired by scene; a stochastic detector counts by its mean over seeds of each scene. Per
+index, with differences signed so that positive is better and a margin that is taken as no difference:
+
+worse
+    the test of (difference + margin) says that its mean is below zero;
+better
+    the test of (difference - margin) says that it is above;
+equal
+    the 95 % bootstrap interval of the mean difference lies within the margin;
+not measurable
+    with so few scenes that no test can reach the level after Holm's correction: the two-sided p of n paired
+    differences cannot fall below ``2 ** (1 - n)``;
+undecided
+    anything else: the data allow a difference beyond the margin as well as none.
+
+Why an identical detector passes: with as many seeds on both sides, baseline and candidate could be exchanged, so the
+difference of each scene is symmetric about zero, however it scatters. The sign-flip test is exact for that, and the
+margin, which is added to every difference, can only raise its p. Holm's correction is over the indices of a detector,
+for one-sided tests in one direction: it holds however the indices hang together. So `worse` is said of an identical
+detector, on whichever index, in at most half of the level of all gate runs, and of a deterministic one never.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Mapping, Sequence
+
+from ...core.errors import ParameterError, UnknownNameError
+from ...core.registry import nearest_hint
+from ...evaluators.base import Evaluator, Index
+from ...reports.gate_text import GateResult, IndexVerdict, Verdict
+from .baseline import Baseline, Measured
+from .inference import bootstrap_interval, holm, lowest_p, scenes_needed, sign_flip_p
+
+__all__ = ["DEFAULT_INDICES", "GATE_LEVEL", "compare", "different_scenes", "gated_indices", "margins_of", "seeds_share"]
+
+#: What is gated when nothing is chosen: both kinds of error, of objects and of areas, and the outline's accuracy.
+DEFAULT_INDICES = (
+    "object.completeness",
+    "object.correctness",
+    "pixel.completeness",
+    "pixel.correctness",
+    "geometric.rmse",
+)
+#: Of 200 gate runs of an identical detector at most one says `worse`.
+GATE_LEVEL = 0.01
+#: Margins by unit: half a percent point, one percent of a ratio, two centimetres, a tenth of a pixel.
+DEFAULT_MARGINS = {"fraction": 0.005, "ratio": 0.01, "m": 0.02, "px": 0.1, "count": 0.0}
+
+
+def gated_indices(evaluator: Evaluator, keys: Sequence[str] | None = None) -> tuple[Index, ...]:
+    """Return the indices that are gated: those of the keys, else the default ones, else every directed main index."""
+    known = {index.key: index for index in evaluator.indices}
+    if keys:
+        for key in keys:
+            if key not in known:
+                raise UnknownNameError(
+                    f"the evaluator {evaluator.name!r} has no index {key!r}{nearest_hint(key, known)}"
+                )
+            if known[key].better == "neither":
+                raise ParameterError(f"{key} has no better direction and cannot be gated")
+        return tuple(known[key] for key in dict.fromkeys(keys))
+    chosen = tuple(known[key] for key in DEFAULT_INDICES if key in known)
+    return chosen or tuple(index for index in known.values() if index.main and index.better != "neither")
+
+
+def margins_of(texts: Sequence[str], indices: Sequence[Index]) -> dict[str, float]:
+    """Return the margin of every gated index: defaults by unit, replaced by ``object.quality=0.005``."""
+    margins = {index.key: DEFAULT_MARGINS.get(index.unit, 0.0) for index in indices}
+    for text in texts:
+        key, _, value = text.partition("=")
+        key = key.strip()
+        if key not in margins:
+            raise UnknownNameError(
+                f"--margin {text}: {key!r} is not gated{nearest_hint(key, margins)}; gated are {', '.join(margins)}"
+            )
+        try:
+            margins[key] = float(value)
+        except ValueError:
+            raise ParameterError(f"cannot read --margin {text!r}: write INDEX=NUMBER, fractions as 0.005") from None
+        if not 0 <= margins[key] < float("inf"):
+            raise ParameterError(f"--margin {text}: a margin is at least 0")
+    return margins
+
+
+def different_scenes(baseline: Baseline, candidate: Baseline) -> list[str]:
+    """Return in words how the scenes of two measurements differ; empty when they are the same."""
+    found = []
+    for name in sorted({*baseline.scenes, *candidate.scenes}):
+        one, two = baseline.scenes.get(name), candidate.scenes.get(name)
+        if one is None or two is None:
+            found.append(f"scene {name} is only in the {'candidate' if one is None else 'baseline'}")
+        elif one.content_hash != two.content_hash:
+            found.append(f"scene {name} has changed since the baseline")
+    if baseline.evaluator != candidate.evaluator:
+        found.append("the evaluators or their parameters differ")
+    missing = [label for label in baseline.detectors if label not in candidate.detectors]
+    found += [f"the candidate has no detector {label}" for label in missing]
+    return found
+
+
+def compare(
+    baseline: Baseline,
+    candidate: Baseline,
+    *,
+    indices: Sequence[Index],
+    margins: Mapping[str, float],
+    level: float = GATE_LEVEL,
+    extra: Sequence[IndexVerdict] = (),
+) -> GateResult:
+    """Return the verdicts of every detector that both have; the scenes must be the same."""
+    verdicts: list[IndexVerdict] = []
+    failures: list[str] = []
+    for label, before in baseline.detectors.items():
+        after = candidate.detectors.get(label)
+        if after is not None:
+            verdicts += compare_detector(label, before, after, indices=indices, margins=margins, level=level)
+            failures += [
+                f"{label} on {scene}, seed {seed}"
+                for (scene, seed), values in before.runs.items()
+                if values is not None and after.runs.get((scene, seed), values) is None
+            ]
+    return GateResult(
+        baseline=str(baseline.version),
+        candidate=str(candidate.version),
+        verdicts=(*verdicts, *extra),
+        failures=tuple(failures),
+        level=level,
+    )
+
+
+def compare_detector(
+    label: str,
+    before: Measured,
+    after: Measured,
+    *,
+    indices: Sequence[Index],
+    margins: Mapping[str, float],
+    level: float = GATE_LEVEL,
+) -> list[IndexVerdict]:
+    """Return the verdict of every index of one detector."""
+    pairs = [_pairs(before, after, index) for index in indices]
+    differences = [
+        [new - old if index.better == "higher" else old - new for old, new in found.values()]
+        for index, found in zip(indices, pairs, strict=True)
+    ]
+    worse = _adjusted([[d + margins[i.key] for d in ds] for i, ds in zip(indices, differences, strict=True)])
+    better = _adjusted([[margins[i.key] - d for d in ds] for i, ds in zip(indices, differences, strict=True)])
+    verdicts = []
+    for place, index in enumerate(indices):
+        found, ds, margin = pairs[place], differences[place], margins[index.key]
+        effect = statistics.fmean(ds) if ds else None
+        low, high = bootstrap_interval(ds) or (None, None)
+        verdict: Verdict = "undecided"
+        p: float | None = None
+        note = ""
+        if lowest_p(len(ds)) > level / len(indices):
+            verdict = "not measurable"
+            note = (
+                f"{label}: {len(indices)} indices at level {level:g} need {scenes_needed(len(indices), level)} scenes "
+                f"where both sides are defined, not {len(ds)}"
+            )
+        elif effect is not None and low is not None and high is not None:
+            if effect < -margin and worse[place] <= level:
+                verdict, p = "worse", worse[place]
+            elif effect > margin and better[place] <= level:
+                verdict, p = "better", better[place]
+            elif -margin <= low and high <= margin:
+                verdict = "equal"
+            else:
+                p = None if abs(effect) <= margin else worse[place] if effect < 0 else better[place]
+                share = seeds_share(before, after, index)
+                if share is not None and share >= 0.5:
+                    note = f"{label}: seeds make {100 * share:.0f} % of the scatter of {index.title}: more narrow it"
+        verdicts.append(
+            IndexVerdict(
+                detector=label,
+                index=index,
+                verdict=verdict,
+                baseline=statistics.fmean(old for old, _ in found.values()) if found else None,
+                candidate=statistics.fmean(new for _, new in found.values()) if found else None,
+                effect=effect,
+                low=low,
+                high=high,
+                p=p,
+                margin=margin,
+                scenes=len(ds),
+                note=note or _lost(label, before, after, index),
+            )
+        )
+    return verdicts
+
+
+def _adjusted(differences: Sequence[Sequence[float]]) -> list[float]:
+    """Return Holm-adjusted two-sided p of differences below zero: twice the one-sided ones.
+
+    Corrected one-sided: a difference that is surely above zero must not lower the bar for the others.
+    """
+    return [min(1.0, 2 * p) for p in holm([sign_flip_p(found) for found in differences])]
+
+
+def _values(measured: Measured, index: Index) -> dict[str, list[float]]:
+    values: dict[str, list[float]] = {}
+    for (scene, _), found in measured.runs.items():
+        value = None if found is None else found.get(index.key)
+        if value is not None:
+            values.setdefault(scene, []).append(value)
+    return values
+
+
+def _by_scene(measured: Measured, index: Index) -> dict[str, float]:
+    return {scene: statistics.fmean(found) for scene, found in _values(measured, index).items()}
+
+
+def _pairs(before: Measured, after: Measured, index: Index) -> dict[str, tuple[float, float]]:
+    """Return (baseline, candidate) by scene, each the mean over its seeds, where both are defined."""
+    old, new = _by_scene(before, index), _by_scene(after, index)
+    return {scene: (old[scene], new[scene]) for scene in sorted(old.keys() & new.keys())}
+
+
+def _lost(label: str, before: Measured, after: Measured, index: Index) -> str:
+    lost = _by_scene(before, index).keys() - _by_scene(after, index).keys()
+    if not lost:
+        return ""
+    return f"{label}: {index.title} is undefined for the candidate on {len(lost)} scenes where the baseline has it"
+
+
+def seeds_share(before: Measured, after: Measured, index: Index) -> float | None:
+    """Return which share of the variance of the mean difference comes from seeds; None where nothing tells.
+
+    Each scene's difference of two means carries the variance over seeds divided by their number, on both sides; the
+    rest of the variance over scenes is how differently the change works on them.
+    """
+    old, new = _values(before, index), _values(after, index)
+    both = old.keys() & new.keys()
+    sides = [side[scene] for scene in both for side in (old, new)]
+    if len(both) < 2 or any(len(found) < 2 for found in sides):
+        return None
+    differences = [statistics.fmean(new[scene]) - statistics.fmean(old[scene]) for scene in both]
+    own = sum(statistics.variance(found) / len(found) for found in sides) / len(both)
+    total = statistics.variance(differences)
+    return min(1.0, own / total) if total else None

@@ -1,0 +1,273 @@
+"""The leaderboard: stored evaluations of a plan, pooled and averaged over scenes, ranked, failures shown."""
+
+from __future__ import annotations
+
+import itertools
+import shlex
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from ...core.errors import UnknownNameError
+from ...core.registry import nearest_hint
+from ...evaluators.base import Evaluation, Evaluator, Index
+from ...reports.tables import Cell, Entry, Incident, Leaderboard
+from ..plan import Judge
+from ..store.records import RunRow
+from ..store.writer import Store
+from .inference import (
+    LEVEL,
+    bootstrap_interval,
+    expanded_level,
+    holm,
+    letter_groups,
+    paired_p,
+    resampling_weights,
+    scenes_needed,
+)
+
+__all__ = ["default_rank_index", "incidents_of", "make_leaderboard", "rank_index", "repeat_command"]
+
+_RESAMPLES = 1000  # of pooled indices, each of which is summarised anew
+
+
+def make_leaderboard(
+    rows: Sequence[RunRow], store: Store, judge: Judge, *, title: str, rank_by: str | None = None
+) -> Leaderboard:
+    """Return the leaderboard of stored runs by one evaluator.
+
+    Parameters
+    ----------
+    rows : sequence of RunRow
+        Runs of every status.
+    store : Store
+    judge : Judge
+    title : str
+    rank_by : str, optional
+        Index key; the evaluator's first quality by default.
+
+    Notes
+    -----
+    The unit is the scene: the value of a detector with several seeds on a scene is the mean over its seeds. Pooled
+    values add the tallies of all runs. A detector without a result on some scene has no rank: its figures are over
+    other scenes than those of the rest.
+    """
+    evaluations = store.evaluations([row.id for row in rows if row.status == "ok"], judge.evaluator, judge.key)
+    counts = store.reference_counts()
+    bare = tuple(dict.fromkeys(row.scene for row in rows if counts.get(row.scene_id, 0) is None))
+    rows = [row for row in rows if row.scene not in bare]
+    scenes = tuple(dict.fromkeys(row.scene for row in rows))
+    indices = tuple(index for index in judge.evaluator.indices if index.main)
+    ranking = rank_index(judge.evaluator, rank_by)
+    if ranking.key not in [index.key for index in indices]:
+        indices = (*indices, ranking)
+    boards = [
+        _Tally(label, [row for row in rows if row.label == label], evaluations, judge.evaluator, counts)
+        for label in dict.fromkeys(row.label for row in rows)
+    ]
+    sign = -1 if ranking.better == "higher" else 1
+
+    def order(board: _Tally) -> tuple[bool, bool, float]:
+        value = board.pooled(ranking).value
+        return board.scenes < len(scenes), value is None, sign * (value or 0.0)
+
+    boards.sort(key=order)
+    entries: list[Entry] = []
+    complete = [board for board in boards if board.scenes == len(scenes)]
+    groups, group_note = _groups(complete, ranking)
+    for place, board in enumerate(boards):
+        measured = board.scenes == len(scenes) and board.pooled(ranking).value is not None
+        same = place > 0 and order(boards[place - 1]) == order(board)
+        rank = None if not measured else entries[-1].rank if same else place + 1
+        entries += board.entries(indices, rank=rank, group=groups.get(board.label, ""))
+    notes = [*group_note, *_notes(boards, scenes), *(f"{scene} has no reference and is left out" for scene in bare)]
+    return Leaderboard(
+        title=title,
+        evaluator=_described(judge.evaluator),
+        rank_by=ranking,
+        indices=indices,
+        entries=tuple(entries),
+        scenes=scenes,
+        notes=tuple(notes),
+        incidents=incidents_of(rows),
+    )
+
+
+class _Tally:
+    """The runs of one detector, gathered by scene."""
+
+    def __init__(
+        self,
+        label: str,
+        rows: Sequence[RunRow],
+        evaluations: Mapping[int, Evaluation],
+        evaluator: Evaluator,
+        references: Mapping[int, int | None],
+    ) -> None:
+        self.label = label
+        self.rows = rows
+        self._evaluator = evaluator
+        self._judged = [row for row in rows if row.id in evaluations]
+        self._evaluations = [evaluations[row.id] for row in self._judged]
+        self._sum = evaluator.pool(self._evaluations) if self._evaluations else None
+        self._reference = sum(references[row.scene_id] or 0 for row in self._judged)
+
+    @property
+    def scenes(self) -> int:
+        """Scenes all of whose runs have a result."""
+        return len({row.scene for row in self._judged} - {row.scene for row in self.rows if row.status != "ok"})
+
+    def pooled(self, index: Index) -> Cell:
+        """Return the ratio of the tallies of all runs, with its interval over resampled scenes."""
+        if self._sum is None:
+            return Cell(None, self.scenes)
+        low, high = self._pooled_intervals.get(index.key, (None, None))
+        return Cell(self._sum.values[index.key], self.scenes, low, high)
+
+    @cached_property
+    def _pooled_intervals(self) -> dict[str, tuple[float, float]]:
+        """Return the interval of every pooled index: scenes are resampled and their tallies added anew."""
+        names = sorted({name for evaluation in self._evaluations for name in evaluation.tallies})
+        scenes = {scene: place for place, scene in enumerate(dict.fromkeys(row.scene for row in self._judged))}
+        if len(scenes) < 2:
+            return {}
+        tallies = np.zeros((len(scenes), len(names)))
+        for row, evaluation in zip(self._judged, self._evaluations, strict=True):
+            tallies[scenes[row.scene]] += [evaluation.tallies.get(name, 0.0) for name in names]
+        resampled: dict[str, list[float]] = {}
+        for sums in resampling_weights(len(scenes), _RESAMPLES) @ tallies:
+            values = self._evaluator.summarise(dict(zip(names, sums.tolist(), strict=True)), {}).values
+            for key, value in values.items():
+                if value is not None:
+                    resampled.setdefault(key, []).append(value)
+        tail = expanded_level(len(scenes))
+        intervals = {}
+        for key, found in resampled.items():
+            if len(found) == _RESAMPLES:
+                low, high = np.quantile(found, [tail, 1 - tail])
+                intervals[key] = (float(low), float(high))
+        return intervals
+
+    def scene_values(self, index: Index) -> dict[str, float]:
+        """Return the mean over seeds of each scene where the index is defined."""
+        values: dict[str, list[float]] = {}
+        for row, evaluation in zip(self._judged, self._evaluations, strict=True):
+            value = evaluation.values[index.key]
+            if value is not None:
+                values.setdefault(row.scene, []).append(value)
+        return {scene: statistics.fmean(found) for scene, found in values.items()}
+
+    def mean(self, index: Index) -> Cell:
+        """Return the mean over scenes, with its interval."""
+        values = list(self.scene_values(index).values())
+        low, high = bootstrap_interval(values) or (None, None)
+        return Cell(statistics.fmean(values) if values else None, len(values), low, high)
+
+    def entries(self, indices: Iterable[Index], *, rank: int | None, group: str) -> list[Entry]:
+        """Return the pooled and the mean entry."""
+        indices = list(indices)
+        done = [row for row in self.rows if row.status == "ok"]
+        entries = []
+        for pooling, cell in (("pooled", self.pooled), ("mean", self.mean)):
+            entries.append(
+                Entry(
+                    label=self.label,
+                    detector=self.label.partition("[")[0],
+                    parameters=self.rows[0].parameters,
+                    pooling="pooled" if pooling == "pooled" else "mean",
+                    rank=rank,
+                    group=group,
+                    scenes=self.scenes,
+                    runs=len(self.rows),
+                    failed=sum(row.status == "failed" for row in self.rows),
+                    skipped=sum(row.status == "skipped" for row in self.rows),
+                    detected=sum(row.detected or 0 for row in self._judged),
+                    reference=self._reference,
+                    cpu_seconds=statistics.median(row.cpu_seconds for row in done) if done else None,
+                    peak_memory=max((row.peak_memory for row in done), default=None),
+                    cells={index.key: cell(index) for index in indices},
+                )
+            )
+        return entries
+
+
+def _groups(boards: Sequence[_Tally], index: Index) -> tuple[dict[str, str], list[str]]:
+    """Return letters shared by detectors that cannot be told apart, and what was tested in words."""
+    if len(boards) < 2:
+        return {}, []
+    values = [board.scene_values(index) for board in boards]
+    pairs = list(itertools.combinations(range(len(boards)), 2))
+    common = {(i, j): sorted(values[i].keys() & values[j].keys()) for i, j in pairs}
+    fewest, needed = min(map(len, common.values())), scenes_needed(len(pairs))
+    if fewest < needed:
+        return {}, [
+            f"groups are not told apart: {len(pairs)} paired tests need {needed} scenes where {index.title} is "
+            f"defined, there are {fewest}"
+        ]
+    p_values = [paired_p([values[i][scene] - values[j][scene] for scene in common[i, j]]) for i, j in pairs]
+    differing = {pair for pair, p in zip(pairs, holm(p_values), strict=True) if p <= LEVEL}
+    letters = letter_groups(len(boards), lambda i, j: (i, j) in differing)
+    note = (
+        f"detectors that share a letter cannot be told apart by {index.title} on these scenes (paired tests over "
+        f"{fewest} scenes, Holm, level {LEVEL:g})"
+    )
+    return {board.label: letter for board, letter in zip(boards, letters, strict=True)}, [note]
+
+
+def default_rank_index(evaluator: Evaluator) -> Index:
+    """Return the index that ranks when none is chosen: a quality, else the first that has a better direction."""
+    directed = [index for index in evaluator.indices if index.better != "neither"]
+    return next((index for index in directed if index.key == "object.quality"), (directed or evaluator.indices)[0])
+
+
+def rank_index(evaluator: Evaluator, key: str | None) -> Index:
+    """Return the index of that key, or the default one; an unknown key is answered with the nearest."""
+    if key is None:
+        return default_rank_index(evaluator)
+    known = {index.key: index for index in evaluator.indices}
+    if key not in known:
+        raise UnknownNameError(
+            f"the evaluator {evaluator.name!r} has no index {key!r}{nearest_hint(key, known)}; "
+            f"it has {', '.join(known)}"
+        )
+    return known[key]
+
+
+def _described(evaluator: Evaluator) -> str:
+    """Return the evaluator with what decides its figures, defaults included."""
+    told = [f"{name} {value}" for name, value in evaluator.values().items() if isinstance(value, str)]
+    told += [f"{name} {value}" for name, value in evaluator.changed().items() if not isinstance(value, str)]
+    return f"{evaluator.name} ({', '.join(told)})" if told else evaluator.name
+
+
+def _notes(boards: Sequence[_Tally], scenes: Sequence[str]) -> tuple[str, ...]:
+    short = [board for board in boards if board.scenes < len(scenes)]
+    return tuple(
+        f"{board.label} has no rank: it has a result on {board.scenes} of {len(scenes)} scenes" for board in short
+    )
+
+
+def incidents_of(rows: Iterable[RunRow]) -> tuple[Incident, ...]:
+    """Return failures, then skips."""
+    found = [row for status in ("failed", "skipped") for row in rows if row.status == status]
+    return tuple(
+        Incident(
+            status=row.status,
+            label=row.label,
+            scene=row.scene,
+            seed=row.seed,
+            reason=row.reason,
+            command=repeat_command(row),
+        )
+        for row in found
+    )
+
+
+def repeat_command(row: RunRow) -> str:
+    """Return the command that repeats a run alone, in full view."""
+    _, bracket, changed = row.label.partition("[")
+    detector = row.detector + bracket + changed
+    words = ["roofbench", "detect", detector, row.recipe.word, "--seed", str(row.seed), "-o", "out.gpkg"]
+    return shlex.join(words)

@@ -1,0 +1,220 @@
+"""Filling a report from the results store.
+
+The runs of a report are the newest of each detector, scene and seed. Tables are over all of them; maps, gallery and
+sizes are drawn of a sample where there are many, and the report says so.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import statistics
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+
+from ...core.errors import InputError, RoofbenchError
+from ...evaluators.base import Index
+from ...reports.gate_text import GateResult
+from ...reports.published import PUBLISHED, Comparison, OursRow
+from ...reports.report_data import CostPoint, Provenance, Report, Sensitivity
+from ...reports.tables import Leaderboard
+from ..identity.provenance import code_version
+from ..plan import Judge
+from ..store.records import RunRow
+from ..store.writer import Store
+from .leaderboard import make_leaderboard
+from .report_scenes import draw_scenes
+from .sensitivity import stored_sensitivities
+
+__all__ = ["fill_report", "newest_runs", "stored_judges"]
+
+Values = Mapping[int, Mapping[str, float | None]]
+
+
+def newest_runs(store: Store, *, detector: str | None = None, scene: str | None = None) -> list[RunRow]:
+    """Return the newest run of each detector label, scene and seed, in the order in which they were first stored.
+
+    Parameters
+    ----------
+    store : Store
+    detector, scene : str, optional
+        Patterns such as ``ndsm*`` for label and scene name.
+    """
+    newest: dict[tuple[str, str, int], RunRow] = {}
+    for row in store.runs():
+        if detector is not None and not fnmatch.fnmatchcase(row.label, detector):
+            continue
+        if scene is not None and not fnmatch.fnmatchcase(row.scene, scene):
+            continue
+        newest.setdefault((row.label, row.scene, row.seed), row)
+    return sorted(newest.values(), key=lambda row: row.id)
+
+
+def stored_judges(store: Store, rows: Sequence[RunRow]) -> list[Judge]:
+    """Return the evaluators that judged these runs, the one that judged most of them first.
+
+    Of evaluators that differ in their code only, the one that judged most; one whose plugin is not here is left out.
+    """
+    good = [row.id for row in rows if row.status == "ok"]
+    found: dict[str, tuple[int, Judge]] = {}
+    for key, recipe in store.evaluators():
+        try:
+            judge = Judge(recipe.evaluator(), recipe, key)
+        except RoofbenchError:
+            continue
+        count = len(store.evaluated(good, key))
+        if count > found.get(judge.label, (0, judge))[0]:
+            found[judge.label] = (count, judge)
+    return [judge for _, judge in sorted(found.values(), key=lambda pair: -pair[0])]
+
+
+def fill_report(
+    store: Store,
+    rows: Sequence[RunRow],
+    *,
+    title: str,
+    judged: Sequence[tuple[Judge, Leaderboard]] | None = None,
+    rank_by: str | None = None,
+    gate: GateResult | None = None,
+    sensitivities: Sequence[Sensitivity] = (),
+    level: float = 0.8,
+) -> Report:
+    """Return everything that a report of these runs shows.
+
+    Parameters
+    ----------
+    store : Store
+    rows : sequence of RunRow
+        Of every status; see `newest_runs`.
+    title : str
+    judged : sequence of (Judge, Leaderboard), optional
+        Evaluators with their leaderboards, where they are made already.
+    rank_by : str, optional
+        Index key.
+    gate : GateResult, optional
+    sensitivities : sequence of Sensitivity
+        Of sweep tables; those that the store's runs give are added.
+    level : float
+        Quality that break-down points are about.
+    """
+    if judged is None:
+        judged = [
+            (judge, make_leaderboard(rows, store, judge, title=title, rank_by=rank_by if place == 0 else None))
+            for place, judge in enumerate(stored_judges(store, rows))
+        ]
+    if not rows or not judged:
+        raise InputError(f"{store.path} holds no evaluated run to report: 'roofbench run' makes some")
+    judge, board = judged[0]
+    good = [row for row in rows if row.status == "ok"]
+    numbers = [row.id for row in good]
+    values = store.index_values(numbers, judge.key)
+    drawn = None
+    for other, _ in judged:  # the first whose verdicts are of the known kinds
+        own = values if other is judge else store.index_values(numbers, other.key)
+        drawn = drawn or draw_scenes(store, good, other.key, own, _labels(board))
+    found = [*sensitivities, *stored_sensitivities(good, values, judge, level=level)]
+    return Report(
+        title=title,
+        boards=tuple(board for _, board in judged),
+        matrix=_matrix(good, values, board.rank_by),
+        scenes=() if drawn is None else drawn.scenes,
+        errors=() if drawn is None else drawn.errors,
+        sizes=() if drawn is None else drawn.sizes,
+        sampling=() if drawn is None else drawn.sampling,
+        sensitivities=tuple(found),
+        costs=_costs(store, good, _labels(board)),
+        comparison=_comparison(good, values),
+        gate=gate,
+        provenance=_provenance(store, rows),
+    )
+
+
+def _labels(board: Leaderboard) -> list[str]:
+    """Return the detectors in the order of the board."""
+    return list(dict.fromkeys(entry.label for entry in board.entries))
+
+
+def _matrix(rows: Sequence[RunRow], values: Values, index: Index) -> dict[str, dict[str, float | None]]:
+    """Return per scene and detector the mean over seeds of an index."""
+    gathered: dict[str, dict[str, list[float]]] = {}
+    for row in rows:
+        cell = gathered.setdefault(row.scene, {}).setdefault(row.label, [])
+        value = values.get(row.id, {}).get(index.key)
+        if value is not None:
+            cell.append(value)
+    return {
+        scene: {label: statistics.fmean(found) if found else None for label, found in cells.items()}
+        for scene, cells in gathered.items()
+    }
+
+
+def _costs(store: Store, rows: Sequence[RunRow], labels: Sequence[str]) -> tuple[CostPoint, ...]:
+    sizes = store.scene_sizes()
+    gathered: dict[tuple[str, int], list[RunRow]] = {}
+    for row in rows:
+        gathered.setdefault((row.label, row.scene_id), []).append(row)
+    return tuple(
+        CostPoint(
+            label=label,
+            scene=mine[0].scene,
+            points=sizes[scene_id][0],
+            hectares=sizes[scene_id][1],
+            cpu_seconds=statistics.median(row.cpu_seconds for row in mine),
+            peak_memory=int(statistics.median(row.peak_memory for row in mine)),
+            runs=len(mine),
+        )
+        for (label, scene_id), mine in sorted(gathered.items(), key=lambda item: labels.index(item[0][0]))
+        if scene_id in sizes
+    )
+
+
+def _comparison(rows: Sequence[RunRow], values: Values) -> Comparison | None:
+    """Return the published rows with ours; None when no detector of theirs ran on a preset of theirs."""
+    by_preset: dict[tuple[str, str], list[RunRow]] = {}
+    for row in rows:
+        recipe = row.recipe
+        if recipe.kind == "preset" and not recipe.parameters and row.id in values:
+            by_preset.setdefault((row.label, recipe.place), []).append(row)
+    pairs = []
+    for published in PUBLISHED:
+        mine = [row for preset in published.presets for row in by_preset.get((published.detector, preset), ())]
+        complete = all((published.detector, preset) in by_preset for preset in published.presets)
+        pairs.append((published, _ours(mine, values) if complete and mine else None))
+    return Comparison(tuple(pairs)) if any(ours for _, ours in pairs) else None
+
+
+def _ours(rows: Sequence[RunRow], values: Values) -> OursRow:
+    gathered: dict[str, dict[str, list[float]]] = {}
+    for row in rows:
+        for key, value in values[row.id].items():
+            if value is not None:
+                gathered.setdefault(key, {}).setdefault(row.scene, []).append(value)
+    means = {
+        key: statistics.fmean(statistics.fmean(found) for found in by_scene.values())
+        for key, by_scene in gathered.items()
+    }
+    return OursRow(scenes=len({row.scene for row in rows}), values=means)
+
+
+def _provenance(store: Store, rows: Sequence[RunRow]) -> Provenance:
+    last = max(rows, key=lambda row: row.id)
+    code, machine = store.code(last.id), store.machine(last.id)
+    seeds = sorted({row.seed for row in rows})
+    facts = [
+        ("report made by", f"roofbench {code_version()}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"),
+        ("runs made by", "; ".join(f"roofbench {version}" for version in dict.fromkeys(row.version for row in rows))),
+        ("command", "; ".join(store.commands()) or "not kept"),
+        ("runs", f"{len(rows):,} from {min(row.finished for row in rows)} to {max(row.finished for row in rows)}"),
+        ("store", f"{store.path.name}, {store.count_runs():,} runs in all"),
+        ("detectors", ", ".join(dict.fromkeys(row.label for row in rows))[:2000]),
+        ("detector seeds", ", ".join(map(str, seeds[:20])) + (", …" if len(seeds) > 20 else "")),
+        ("machine", ", ".join(f"{name} {value}" for name, value in machine.items()) or "not known"),
+        ("packages", ", ".join(f"{name} {version}" for name, version in code.packages.items()) or "not known"),
+    ]
+    scenes = {row.scene_id: row for row in rows}
+    hashes = store.scene_hashes()
+    return Provenance(
+        facts=tuple(facts),
+        scenes=tuple(
+            (row.scene, row.recipe.word, hashes.get(scene_id) or "not opened") for scene_id, row in scenes.items()
+        ),
+    )

@@ -1,0 +1,230 @@
+"""Sensitivities: lines of a sweep, found among stored runs or read from the table that ``roofbench sweep`` writes.
+
+A stored run lies on an axis of the generator when its preset was changed in that one parameter, and on an axis of its
+detector when that one parameter differs from the default. Unchanged runs of the same scenes give the default's point.
+"""
+
+from __future__ import annotations
+
+import itertools
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...core.errors import InputError, RoofbenchError, UnknownNameError
+from ...core.registry import nearest_hint
+from ...detectors.registry import make_detector
+from ...evaluators.base import Index
+from ...evaluators.registry import make_evaluator
+from ...reports.report_data import Sensitivity, SensitivityPoint
+from ...scenes.synthetic.presets import preset, preset_names
+from ...scenes.synthetic.recipe import SceneParameters
+from ..plan import Judge
+from ..store.records import RunRow
+from .inference import bootstrap_interval
+from .sweep import find_break_down
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["read_sweep_table", "sensitivity_indices", "stored_sensitivities"]
+
+#: As in figure 8 of the 2010 paper; the first is the one that break-down points are about.
+_INDICES = ("object.quality", "pixel.quality")
+_MOST_LINES = 200
+
+Values = Mapping[int, Mapping[str, float | None]]
+
+
+def sensitivity_indices(indices: Sequence[Index], chosen: Sequence[str] = ()) -> list[Index]:
+    """Return the indices to plot: those chosen, else object- and area-based quality, else the first one."""
+    known = [index.key for index in indices]
+    for key in chosen:
+        if key not in known:
+            raise UnknownNameError(f"no index {key!r}{nearest_hint(key, known)}; there are {', '.join(known)}")
+    wanted = [index for index in indices if index.key in (chosen or _INDICES)]
+    return wanted or list(indices[:1])
+
+
+def stored_sensitivities(
+    rows: Sequence[RunRow], values: Values, judge: Judge, *, level: float, chosen: Sequence[str] = ()
+) -> list[Sensitivity]:
+    """Return the sweeps that stored runs make up: axes with at least two values.
+
+    Parameters
+    ----------
+    rows : sequence of RunRow
+        Of status ``ok``.
+    values : mapping of int to mapping
+        Index values by run.
+    judge : Judge
+    level : float
+        Value of the first index at which a detector counts as broken down.
+    chosen : sequence of str
+        Index keys; object- and area-based quality by default.
+    """
+    rows = [row for row in rows if row.id in values]
+    indices = sensitivity_indices(judge.evaluator.indices, chosen)
+    lines = []
+    for axis, unit, default, label, by_value in itertools.chain(_scene_axes(rows), _detector_axes(rows)):
+        for index in indices:
+            points = tuple(_point(value, mine, values, index) for value, mine in _in_order(by_value))
+            if sum(point.mean is not None for point in points) < 2:
+                continue
+            line = Sensitivity(detector=label, axis=axis, unit=unit, index=index, points=points, default=default)
+            lines.append(_with_break_down(line, level) if index is indices[0] else line)
+    return lines[:_MOST_LINES]
+
+
+def read_sweep_table(path: Path, *, indices: Sequence[str] = (), level: float = 0.8) -> list[Sensitivity]:
+    """Read a table that ``roofbench sweep -o`` wrote; only axes that were varied alone can be drawn.
+
+    Raises
+    ------
+    InputError
+        No such file, or no such table.
+    """
+    import pandas as pd
+
+    if not path.is_file():
+        raise InputError(f"{path}: no such sweep table; 'roofbench sweep ... -o {path.name}' writes one")
+    try:
+        table = pd.read_parquet(path) if path.suffix.lower() == ".parquet" else pd.read_csv(path)
+    except (ValueError, OSError, ImportError) as error:
+        raise InputError(f"{path}: cannot be read as a sweep table: {' '.join(str(error).split())[:200]}") from error
+    needed = {"detector", "axis", "evaluator", "index", "mean", "low", "high", "scenes"}
+    if not needed <= set(table.columns):
+        missing = ", ".join(sorted(needed - set(table.columns)))
+        raise InputError(f"{path}: no sweep table, it has no column {missing}; 'roofbench sweep ... -o' writes one")
+    lines: list[Sensitivity] = []
+    for (evaluator, detector, axis), mine in table.groupby(["evaluator", "detector", "axis"], sort=False):
+        if axis in mine.columns:
+            lines += _lines_of(mine, str(evaluator), str(detector), str(axis), indices, level)
+    if not lines:
+        raise InputError(f"{path}: holds no axis that was varied alone: sweep without --grid")
+    return lines
+
+
+def _lines_of(
+    table: pd.DataFrame, evaluator: str, detector: str, axis: str, chosen: Sequence[str], level: float
+) -> list[Sensitivity]:
+    lines = []
+    shown = sensitivity_indices(make_evaluator(evaluator).indices, chosen)
+    for index in shown:
+        mine = table[table["index"] == index.key]
+        points = tuple(
+            SensitivityPoint(
+                _plain(row[axis]), _number(row["mean"]), _number(row["low"]), _number(row["high"]), int(row["scenes"])
+            )
+            for row in mine.to_dict("records")
+        )
+        if points:
+            unit, default = _facts_of(axis, detector.partition("[")[0])
+            line = Sensitivity(detector=detector, axis=axis, unit=unit, index=index, points=points, default=default)
+            lines.append(_with_break_down(line, level) if index is shown[0] else line)
+    return lines
+
+
+def _plain(value: Any) -> Any:
+    value = value.item() if hasattr(value, "item") else value
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None or value != value else float(value)
+
+
+Axis = tuple[str, str, Any, str, dict[Any, list[RunRow]]]
+
+
+def _scene_axes(rows: Sequence[RunRow]) -> Iterable[Axis]:
+    """Yield the axes of the generator: name, unit, default, label of the line, runs by value."""
+    plain: dict[tuple[str, str], list[RunRow]] = {}
+    varied: dict[tuple[str, str, str], dict[Any, list[RunRow]]] = {}
+    for row in rows:
+        recipe = row.recipe
+        if recipe.kind != "preset":
+            continue
+        if not recipe.parameters:
+            plain.setdefault((row.label, recipe.place), []).append(row)
+        elif len(recipe.parameters) == 1:
+            ((name, value),) = recipe.parameters.items()
+            varied.setdefault((name, recipe.place, row.label), {}).setdefault(value, []).append(row)
+    for (name, place, label), by_value in varied.items():
+        unit, default = _facts_of(f"scene.{name}", place)
+        if default is not None and default not in by_value:
+            seeds = {row.recipe.seed for mine in by_value.values() for row in mine}
+            same = [row for row in plain.get((label, place), ()) if row.recipe.seed in seeds]
+            by_value = {**by_value, default: same} if same else by_value
+        if len(by_value) > 1:
+            yield f"scene.{name}", unit, None, f"{label} on {place}", by_value
+
+
+def _detector_axes(rows: Sequence[RunRow]) -> Iterable[Axis]:
+    """Yield the axes of the detectors: parameters that differ alone from the default."""
+    plain = {row.detector: row.parameters for row in rows if "[" not in row.label.rpartition("/")[2]}
+    varied: dict[tuple[str, str], dict[Any, list[RunRow]]] = {}
+    for row in rows:
+        default = plain.get(row.detector)
+        if default is None:
+            continue
+        changed = {name: value for name, value in row.parameters.items() if default.get(name) != value}
+        if len(changed) == 1:
+            ((name, value),) = changed.items()
+            varied.setdefault((row.detector, name), {}).setdefault(value, []).append(row)
+    for (detector, name), by_value in varied.items():
+        scenes = {row.scene for mine in by_value.values() for row in mine}
+        default = plain[detector][name]
+        label = detector.rpartition(":")[2]
+        unit, _ = _facts_of(name, detector)
+        same = [
+            row
+            for row in rows
+            if row.detector == detector and row.scene in scenes and row.parameters == plain[detector]
+        ]
+        yield name, unit, default, label, {**by_value, default: same}
+
+
+def _facts_of(axis: str, owner: str) -> tuple[str, Any]:
+    """Return unit and default of an axis; empty and None where they are not known here."""
+    name = axis.removeprefix("scene.")
+    try:
+        if axis != name:
+            known = SceneParameters.parameters()
+            return known[name].unit, preset(owner).values()[name] if owner in preset_names() else None
+        detector = make_detector(owner)
+        return detector.parameters()[name].unit, detector.values()[name]
+    except (RoofbenchError, KeyError):
+        return "", None
+
+
+def _in_order(by_value: Mapping[Any, list[RunRow]]) -> list[tuple[Any, list[RunRow]]]:
+    numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in by_value)
+    return sorted(by_value.items(), key=lambda item: item[0] if numbers else str(item[0]))
+
+
+def _point(value: Any, rows: Sequence[RunRow], values: Values, index: Index) -> SensitivityPoint:
+    """Return the mean over scenes, each the mean over seeds of the detector."""
+    by_scene: dict[str, list[float]] = {}
+    for row in rows:
+        found = values[row.id].get(index.key)
+        if found is not None:
+            by_scene.setdefault(row.scene, []).append(found)
+    means = [statistics.fmean(found) for found in by_scene.values()]
+    low, high = bootstrap_interval(means) or (None, None)
+    return SensitivityPoint(value, statistics.fmean(means) if means else None, low, high, len(means))
+
+
+def _with_break_down(line: Sensitivity, level: float) -> Sensitivity:
+    """Return the line with the place where its mean first passes the level for the worse; only numbers have places."""
+    known = [point for point in line.points if point.mean is not None]
+    if line.index.better == "neither" or any(not isinstance(p.value, int | float) or p.value is True for p in known):
+        return line
+    known.sort(key=lambda point: point.value)
+    sign = -1.0 if line.index.better == "lower" else 1.0
+    margins = [sign * ((point.mean or 0.0) - level) for point in known]
+    places = [float(point.value) for point in known]
+    found = find_break_down(places, margins, line.detector, line.axis, line.index.key, level)
+    return replace(line, break_down=str(found), place=found.value)

@@ -1,0 +1,333 @@
+"""Sweeps: how a detector's quality moves with one of its parameters, or with what makes a scene hard.
+
+Nouns
+-----
+axis
+    A parameter of the detector (``tile_size``) or of the generator (``scene.tree_density``) with its values. The
+    value None stands for the default.
+point
+    One value on one axis, the others at their defaults; or, in a grid, one value on every axis.
+break-down
+    Where the mean of an index first passes a level for the worse along a numeric axis, interpolated between points.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import statistics
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from ...core.errors import ParameterError
+from ...core.registry import nearest_hint
+from ...detectors.base import Detector
+from ...evaluators.base import Index
+from ...scenes.scene import Scene
+from ..execution.runner import Execution, run_plan
+from ..execution.tasks import Outcome
+from ..identity.recipes import SceneRecipe
+from ..plan import Judge, Overwrite, Plan, PlannedRun, make_plan
+from ..store.records import RunRow
+from ..store.writer import Store
+from ..suite import Entrant, Suite
+from .inference import bootstrap_interval
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = [
+    "Axis",
+    "BreakDown",
+    "Point",
+    "Sweep",
+    "axis_of",
+    "break_downs",
+    "find_break_down",
+    "make_sweep",
+    "run_sweep",
+]
+
+_SCENE = "scene."
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What is varied: ``tile_size`` or ``scene.slope``, and its values in order."""
+
+    name: str
+    values: tuple[Any, ...]
+
+    @property
+    def of_scene(self) -> bool:
+        """Whether it is an axis of the generator."""
+        return self.name.startswith(_SCENE)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One place of a sweep: the axis that is varied (``grid`` for all) and the values of the varied axes."""
+
+    axis: str
+    values: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Points, each with the plan of its runs, and one plan that holds them all, every run once."""
+
+    axes: tuple[Axis, ...]
+    detectors: tuple[Detector, ...]
+    points: tuple[tuple[Point, Detector, Plan], ...]
+    plan: Plan
+
+
+@dataclass(frozen=True, kw_only=True)
+class BreakDown:
+    """Where a detector breaks down on an axis.
+
+    Attributes
+    ----------
+    detector, axis, index : str
+    level : float
+    value : float, optional
+        Place on the axis; None when the index never passes the level.
+    at_start : bool
+        The first point is beyond the level already.
+    """
+
+    detector: str
+    axis: str
+    index: str
+    level: float
+    value: float | None
+    at_start: bool = False
+
+    def __str__(self) -> str:
+        if self.value is None:
+            return f"{self.detector}: {self.index} stays on the good side of {self.level:g} along {self.axis}"
+        if self.at_start:
+            return f"{self.detector}: {self.index} is beyond {self.level:g} from the first point of {self.axis} on"
+        return f"{self.detector}: {self.index} passes {self.level:g} at {self.axis} = {self.value:.4g}"
+
+
+def axis_of(text: str) -> Axis:
+    """Read ``tile_size=400,450,500`` or ``scene.slope=0:20:5`` (from, to, step, the end included).
+
+    >>> axis_of("scene.slope=0:20:5").values
+    (0, 5, 10, 15, 20)
+    """
+    name, equals, listed = text.partition("=")
+    name, words = name.strip(), [word.strip() for word in listed.split(",") if word.strip()]
+    if not (name and equals and words):
+        raise ParameterError(f"cannot read --vary {text!r}: write NAME=VALUE,VALUE,... or NAME=FROM:TO:STEP")
+    values: list[Any] = []
+    for word in words:
+        values += _range(word, text) if word.count(":") == 2 else [_value(word)]
+    if len(set(values)) != len(values):
+        raise ParameterError(f"--vary {text!r} names a value twice")
+    return Axis(name, tuple(values))
+
+
+def _value(word: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(word)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(word.lower(), word)
+
+
+def _range(word: str, text: str) -> list[Any]:
+    start, end, step = (_value(part) for part in word.split(":"))
+    numbers = all(isinstance(number, int | float) and not isinstance(number, bool) for number in (start, end, step))
+    if not numbers or not step or (end - start) / step < 0 or (end - start) / step > 10_000:
+        raise ParameterError(f"cannot read {word!r} in --vary {text!r}: write FROM:TO:STEP")
+    count = math.floor((end - start) / step + 1e-9) + 1
+    return [start + place * step for place in range(count)]
+
+
+def make_sweep(
+    suite: Suite, axes: Sequence[Axis], store: Store, *, grid: bool = False, overwrite: Overwrite = "missing"
+) -> Sweep:
+    """Plan a sweep of the suite's detectors over its scenes.
+
+    Parameters
+    ----------
+    suite : Suite
+        Its detectors and scenes are the defaults from which one axis at a time is varied.
+    axes : sequence of Axis
+    store : Store
+    grid : bool
+        Vary all axes together.
+    overwrite : {"missing", "never", "always"}
+
+    Raises
+    ------
+    ParameterError
+        An axis that no detector has, a value outside its range, or a generator axis without a synthetic scene.
+    """
+    _check_axes(suite, axes)
+    points: list[tuple[Point, Detector, Plan]] = []
+    for entrant in suite.entrants:
+        for point in _points(axes, grid=grid):
+            own = {name: value for name, value in point.values.items() if not name.startswith(_SCENE)}
+            if not own.keys() <= entrant.detector.parameters().keys():
+                continue  # another detector's axis
+            detector = type(entrant.detector).build({**entrant.detector.values(), **own})
+            part = replace(suite, scenes=_scenes(suite, point), entrants=(Entrant(detector, entrant.seeds),))
+            points.append((point, entrant.detector, make_plan(part, store, overwrite=overwrite)))
+    runs = {run.identity.key: run for _, _, plan in points for run in plan.runs}
+    ordered = sorted(runs.values(), key=lambda run: run.identity.scene.name)  # workers keep the scene they have open
+    judges = points[0][2].judges
+    detectors = tuple(entrant.detector for entrant in suite.entrants)
+    return Sweep(tuple(axes), detectors, tuple(points), Plan(suite, tuple(ordered), judges))
+
+
+def _check_axes(suite: Suite, axes: Sequence[Axis]) -> None:
+    known = {name for entrant in suite.entrants for name in entrant.detector.parameters()}
+    synthetic = any(not isinstance(scene, Scene) and scene.kind == "preset" for scene in suite.scenes)
+    if not axes:
+        raise ParameterError("nothing is varied: give --vary NAME=VALUE,VALUE,...")
+    for axis in axes:
+        if axis.of_scene and not synthetic:
+            raise ParameterError(
+                f"{axis.name} is an axis of the generator, but no scene of {suite.name!r} is synthetic"
+            )
+        if not axis.of_scene and axis.name not in known:
+            names = ", ".join(entrant.detector.name for entrant in suite.entrants)
+            raise ParameterError(
+                f"{names}: no parameter {axis.name!r}{nearest_hint(axis.name, known)} to vary; an axis of the "
+                f"generator is written {_SCENE}NAME"
+            )
+
+
+def _points(axes: Sequence[Axis], *, grid: bool) -> Iterator[Point]:
+    if grid:
+        for values in itertools.product(*(axis.values for axis in axes)):
+            yield Point("grid", dict(zip((axis.name for axis in axes), values, strict=True)))
+        return
+    for axis in axes:
+        for value in axis.values:
+            yield Point(axis.name, {axis.name: value})
+
+
+def _scenes(suite: Suite, point: Point) -> tuple[SceneRecipe | Scene, ...]:
+    """Return the scenes at a point; those that are not synthetic take no part in a sweep of the generator."""
+    varied = {name.removeprefix(_SCENE): value for name, value in point.values.items() if name.startswith(_SCENE)}
+    if not varied:
+        return suite.scenes
+    return tuple(
+        SceneRecipe.of_preset(scene.place, seed=scene.seed, parameters={**scene.parameters, **varied})
+        for scene in suite.scenes
+        if not isinstance(scene, Scene) and scene.kind == "preset"
+    )
+
+
+def run_sweep(
+    sweep: Sweep,
+    store: Store,
+    *,
+    execution: Execution | None = None,
+    overwrite: Overwrite = "missing",
+    progress: Callable[[PlannedRun, Outcome], None] | None = None,
+) -> tuple[pd.DataFrame, tuple[RunRow, ...]]:
+    """Run what is missing; return the tidy table and every run of the sweep.
+
+    Returns
+    -------
+    table : DataFrame
+        One row per detector, point, evaluator and index: columns ``detector``, ``axis``, one per varied axis,
+        ``evaluator``, ``index``, ``symbol``, ``unit``, ``mean`` over scenes, ``low`` and ``high`` (95 % bootstrap
+        interval over scenes), ``scenes`` (where it is defined), ``runs``, ``failed``, ``skipped``.
+    rows : tuple of RunRow
+    """
+    result = run_plan(sweep.plan, store, execution=execution, overwrite=overwrite, progress=progress)
+    return sweep_table(sweep, store, {row.key: row for row in result.rows}), result.rows
+
+
+def sweep_table(sweep: Sweep, store: Store, rows: Mapping[str, RunRow]) -> pd.DataFrame:
+    """Return the tidy table of stored runs; see `run_sweep`."""
+    import pandas as pd
+
+    good = [row.id for row in rows.values() if row.status == "ok"]
+    records: list[dict[str, Any]] = []
+    for judge in sweep.plan.judges:
+        values = store.index_values(good, judge.key)
+        for point, detector, plan in sweep.points:
+            records += _records(point, detector, judge, [rows[key] for key in plan.keys if key in rows], values)
+    names = [axis.name for axis in sweep.axes]
+    columns = ["detector", "axis", *names, "evaluator", "index", "symbol", "unit", "mean", "low", "high", "scenes"]
+    return pd.DataFrame.from_records(records, columns=[*columns, "runs", "failed", "skipped"])
+
+
+def _records(
+    point: Point,
+    detector: Detector,
+    judge: Judge,
+    rows: Sequence[RunRow],
+    values: Mapping[int, Mapping[str, float | None]],
+) -> Iterator[dict[str, Any]]:
+    common = {
+        "detector": Entrant(detector).label,
+        "axis": point.axis,
+        **point.values,
+        "evaluator": judge.label,
+        "runs": len(rows),
+        "failed": sum(row.status == "failed" for row in rows),
+        "skipped": sum(row.status == "skipped" for row in rows),
+    }
+    for index in judge.evaluator.indices:
+        by_scene: dict[str, list[float]] = {}
+        for row in rows:
+            value = values.get(row.id, {}).get(index.key)
+            if value is not None:
+                by_scene.setdefault(row.scene, []).append(value)
+        means = [statistics.fmean(found) for found in by_scene.values()]
+        low, high = bootstrap_interval(means) or (None, None)
+        yield {
+            **common,
+            "index": index.key,
+            "symbol": index.symbol,
+            "unit": index.unit,
+            "mean": statistics.fmean(means) if means else None,
+            "low": low,
+            "high": high,
+            "scenes": len(means),
+        }
+
+
+def break_downs(table: pd.DataFrame, axes: Sequence[Axis], index: Index, level: float) -> list[BreakDown]:
+    """Return where each detector's mean of an index first passes a level for the worse, per numeric axis.
+
+    Only axes that were varied alone are looked at: on a grid there is no single place.
+    """
+    found = []
+    sign = -1.0 if index.better == "lower" else 1.0
+    mine = table[table["index"] == index.key]
+    for detector in dict.fromkeys(mine["detector"]):
+        for axis in axes:
+            if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in axis.values):
+                continue
+            line = mine[(mine["detector"] == detector) & (mine["axis"] == axis.name)].dropna(subset=["mean"])
+            line = line.sort_values(axis.name)
+            places = [float(value) for value in line[axis.name]]
+            margins = [sign * (float(value) - level) for value in line["mean"]]
+            if places:
+                found.append(find_break_down(places, margins, str(detector), axis.name, index.key, level))
+    return found
+
+
+def find_break_down(
+    places: list[float], margins: list[float], detector: str, axis: str, index: str, level: float
+) -> BreakDown:
+    """Return the first place where the margin falls below zero, by linear interpolation."""
+    if margins[0] < 0:
+        return BreakDown(detector=detector, axis=axis, index=index, level=level, value=places[0], at_start=True)
+    for before, after in itertools.pairwise(range(len(places))):
+        if margins[after] < 0:
+            share = margins[before] / (margins[before] - margins[after])
+            value = places[before] + share * (places[after] - places[before])
+            return BreakDown(detector=detector, axis=axis, index=index, level=level, value=value)
+    return BreakDown(detector=detector, axis=axis, index=index, level=level, value=None)

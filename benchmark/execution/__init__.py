@@ -1,0 +1,1 @@
+"""Execution: tasks, and the processes that run them."""

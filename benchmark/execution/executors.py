@@ -1,0 +1,81 @@
+"""Executors: where tasks are done, all behind ``concurrent.futures.Executor``.
+
+A *slot* is an executor with the number of tasks that it is given at once. On this machine each worker is a slot of one
+thread with an isolated process of its own, so that the runs of a scene can be kept on the worker that has it open. A
+Dask cluster is one slot; its workers do each task in an isolated process of theirs, so limits and crashes are handled
+the same way there. `InProcess` does tasks at once in the calling process: for objects that no other process can make,
+and for debuggers.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from ...core.errors import InputError, UnsupportedError
+from .isolation import close_isolated
+
+__all__ = ["InProcess", "Slot", "cluster_slot", "local_slots"]
+
+T = TypeVar("T")
+
+#: Tasks handed to a slot beyond its workers, so that none of them waits for the store.
+_AHEAD = 1
+_CONNECT_SECONDS = 15
+
+
+@dataclass(frozen=True, eq=False)
+class Slot:
+    """An executor and how many tasks it is given at once."""
+
+    executor: Executor
+    capacity: int
+
+
+class InProcess(Executor):
+    """An executor that does a task when it is submitted."""
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        """Do it now and return the finished future."""
+        future: Future[T] = concurrent.futures.Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+@contextmanager
+def local_slots(workers: int) -> Iterator[list[Slot]]:
+    """Yield that many isolated processes on this machine; they end with the block."""
+    executors = [ThreadPoolExecutor(max_workers=1, thread_name_prefix=f"roofbench-{n}") for n in range(workers)]
+    try:
+        yield [Slot(executor, 1 + _AHEAD) for executor in executors]
+    finally:
+        for executor in executors:
+            executor.shutdown(wait=False, cancel_futures=True)
+        close_isolated()  # what still runs has nobody to wait for it
+        for executor in executors:
+            executor.shutdown(wait=True)
+
+
+@contextmanager
+def cluster_slot(address: str) -> Iterator[Slot]:
+    """Yield the Dask cluster at `address`."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise UnsupportedError("--scheduler needs Dask: pip install 'roofbench[dask]'") from error
+    try:
+        client = Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
+    with client:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise InputError(f"the Dask scheduler at {address} has no workers: start one with 'dask worker {address}'")
+        yield Slot(client.get_executor(pure=False), 2 * threads + _AHEAD)

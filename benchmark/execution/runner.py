@@ -1,0 +1,238 @@
+"""The runner: does what a plan says, stores every outcome in a transaction of its own, and tells what happens."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from ...core.errors import UnsupportedError
+from ...scenes.scene import Scene
+from ..identity.provenance import code_version
+from ..identity.recipes import PluginRecipe, SceneRecipe
+from ..identity.spool import spool
+from ..plan import Judge, Overwrite, Plan, PlannedRun, scene_recipe
+from ..store.records import RunRow
+from ..store.writer import Store
+from .dispatch import Dispatcher
+from .executors import InProcess, Slot, cluster_slot, local_slots
+from .isolation import Limits, call_isolated
+from .tasks import Outcome, Score, Task
+from .worker import execute
+
+__all__ = ["Execution", "RunResult", "run_plan", "score_stored"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Execution:
+    """How runs are executed.
+
+    Attributes
+    ----------
+    jobs : int
+        Worker processes on this machine; 0 runs in this process, without limits and without isolation.
+    scheduler : str, optional
+        Address of a Dask scheduler, used instead of processes on this machine.
+    limits : Limits
+        Of each run.
+    """
+
+    jobs: int = 1
+    scheduler: str | None = None
+    limits: Limits = field(default_factory=Limits)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunResult:
+    """What a plan has come to: rows of the store, in the plan's order.
+
+    Attributes
+    ----------
+    rows : tuple of RunRow
+        Every run of the plan that is stored, done now or before.
+    done : int
+        Detections made now.
+    evaluated : int
+        Stored detections that were evaluated now.
+    """
+
+    rows: tuple[RunRow, ...]
+    done: int
+    evaluated: int
+
+    @property
+    def failed(self) -> tuple[RunRow, ...]:
+        """The failed runs."""
+        return tuple(row for row in self.rows if row.status == "failed")
+
+    @property
+    def skipped(self) -> tuple[RunRow, ...]:
+        """The skipped runs."""
+        return tuple(row for row in self.rows if row.status == "skipped")
+
+    @property
+    def ok(self) -> tuple[RunRow, ...]:
+        """The good runs."""
+        return tuple(row for row in self.rows if row.status == "ok")
+
+
+def run_plan(
+    plan: Plan,
+    store: Store,
+    *,
+    execution: Execution | None = None,
+    overwrite: Overwrite = "missing",
+    progress: Callable[[PlannedRun, Outcome], None] | None = None,
+) -> RunResult:
+    """Do what is to be done and return what is stored.
+
+    Parameters
+    ----------
+    plan : Plan
+    store : Store
+    execution : Execution, optional
+        One worker process by default.
+    overwrite : {"missing", "never", "always"}
+        As the plan was made.
+    progress : callable, optional
+        Told every finished run with its outcome.
+    """
+    execution = execution or Execution()
+    version = str(code_version())
+    evaluated = 0
+    for run in plan.runs:
+        if run.todo == "evaluate":
+            assert run.stored is not None
+            score_stored(store, run.stored, run.lacking)
+            evaluated += 1
+    waiting = [run for run in plan.runs if run.todo == "detect"]
+    done = 0
+    for run, outcome in _outcomes(waiting, plan, store, execution, overwrite):
+        store.record(run.identity, outcome, version=version, replace=overwrite == "always")
+        done += 1
+        if progress is not None:
+            progress(run, outcome)
+    stored = store.runs_of(plan.keys)
+    rows = tuple(stored[key] for key in plan.keys if key in stored)
+    return RunResult(rows=rows, done=done, evaluated=evaluated)
+
+
+def score_stored(store: Store, run_id: int, judges: tuple[Judge, ...]) -> int:
+    """Evaluate stored detections by further evaluators; nothing is detected and no scene is opened.
+
+    Returns how many evaluations were added: none for a scene without reference.
+    """
+    scene = store.scene(store.run(run_id).scene_id)
+    if scene.reference is None:
+        return 0
+    detected = store.detections(run_id)
+    for judge in judges:
+        evaluation = judge.evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.grid)
+        store.add_score(run_id, Score.of(evaluation, judge.recipe, judge.code))
+    return len(judges)
+
+
+def _outcomes(
+    runs: list[PlannedRun], plan: Plan, store: Store, execution: Execution, overwrite: Overwrite
+) -> Iterator[tuple[PlannedRun, Outcome]]:
+    """Yield outcomes as they come in; a run that another process stored meanwhile is left out."""
+    if not runs:
+        return
+    described = store.described_scenes()
+    evaluators = tuple(judge.recipe for judge in plan.judges)
+    codes = tuple(judge.code for judge in plan.judges)
+    with ExitStack() as stack:
+        slots = stack.enter_context(_slots(execution, len(runs)))
+        elsewhere = execution.jobs > 0 or execution.scheduler is not None
+        scenes = _Scenes(stack, elsewhere=elsewhere)
+        dispatcher, flying = Dispatcher(runs), dict[Future[bytes], tuple[PlannedRun, Slot]]()
+        free = [slot for turn in range(max(slot.capacity for slot in slots)) for slot in slots if turn < slot.capacity]
+        while True:
+            while free and (run := dispatcher.next_for(free[0])) is not None:
+                if overwrite != "always" and _is_stored(store, run):
+                    continue
+                task = Task(
+                    scene=scenes.recipe(run.scene),
+                    detector=run.identity.detector,
+                    seed=run.identity.seed,
+                    evaluators=evaluators,
+                    codes=codes,
+                    describe_scene=run.identity.scene_key not in described,
+                )
+                slot = free.pop(0)
+                if elsewhere:
+                    _must_be_portable(run)
+                    future = slot.executor.submit(call_isolated, task.to_json(), execution.limits)
+                else:
+                    future = slot.executor.submit(_in_process, run, task, plan)
+                flying[future] = run, slot
+            if not flying:
+                return
+            finished, _ = wait(flying, return_when=FIRST_COMPLETED)
+            for future in finished:
+                run, slot = flying.pop(future)
+                free.append(slot)
+                outcome = _outcome(future)
+                if outcome.scene is not None:
+                    described.add(run.identity.scene_key)
+                yield run, outcome
+
+
+def _in_process(run: PlannedRun, task: Task, plan: Plan) -> bytes:
+    scene = run.scene if isinstance(run.scene, Scene) else None
+    evaluators = [judge.evaluator for judge in plan.judges]
+    return execute(task, scene=scene, detector=run.entrant.detector, evaluators=evaluators).to_bytes()
+
+
+def _outcome(future: Future[bytes]) -> Outcome:
+    """Return the outcome of a future; what the executor itself raises is the failure of that run."""
+    try:
+        return Outcome.from_bytes(future.result())
+    except Exception as error:
+        return Outcome(status="failed", reason=f"the executor gave up: {type(error).__name__}: {error}")
+
+
+def _is_stored(store: Store, run: PlannedRun) -> bool:
+    found = store.statuses([run.identity.key]).get(run.identity.key)
+    return found is not None and found[1] != "failed"
+
+
+def _must_be_portable(run: PlannedRun) -> None:
+    if run.identity.detector.use.startswith("(this process)"):
+        PluginRecipe.of(run.entrant.detector)  # raises with the remedy
+
+
+class _Scenes:
+    """Recipes that workers can open; scenes of this process are spooled once."""
+
+    def __init__(self, stack: ExitStack, *, elsewhere: bool) -> None:
+        self._stack = stack
+        self._elsewhere = elsewhere
+        self._folder: Path | None = None
+        self._spooled: dict[int, SceneRecipe] = {}
+
+    def recipe(self, scene: SceneRecipe | Scene) -> SceneRecipe:
+        if not isinstance(scene, Scene) or not self._elsewhere:
+            return scene_recipe(scene)
+        if id(scene) not in self._spooled:
+            if self._folder is None:
+                self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="roofbench-")))
+            self._spooled[id(scene)] = spool(scene, self._folder)
+        return replace(self._spooled[id(scene)], name=scene.name)
+
+
+@contextmanager
+def _slots(execution: Execution, tasks: int) -> Iterator[list[Slot]]:
+    if execution.scheduler is not None:
+        if execution.jobs == 0:
+            raise UnsupportedError("jobs=0 runs in this process and cannot be combined with a scheduler")
+        with cluster_slot(execution.scheduler) as slot:
+            yield [slot]
+    elif execution.jobs == 0:
+        yield [Slot(InProcess(), 1)]
+    else:
+        with local_slots(min(execution.jobs, tasks)) as slots:
+            yield slots

@@ -1,0 +1,284 @@
+"""Tasks and outcomes: what goes to a worker and what comes back, as text and bytes that any executor can carry.
+
+Nouns
+-----
+task
+    One detector with its parameters, one scene, one seed, and the evaluators that judge the result; a few hundred
+    bytes of JSON.
+outcome
+    What became of it: status ``ok``, ``failed`` or ``skipped``, with reason, cost, raw detections and evaluations.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, Self
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...evaluators.base import Evaluation
+from ...scenes.geodata.footprints import Footprints
+from ..identity.recipes import PluginRecipe, SceneRecipe
+
+__all__ = ["Cost", "Outcome", "SceneRecord", "Score", "Status", "Task"]
+
+Status = Literal["ok", "failed", "skipped"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One run to be done.
+
+    Attributes
+    ----------
+    scene, detector : recipes
+    seed : int
+        Of the detector's random stream; 0 when it draws no random numbers.
+    evaluators : tuple of PluginRecipe
+    codes : tuple of str
+        Digest of the source that each evaluator depends on, where the caller has read it already.
+    describe_scene : bool
+        Whether the outcome shall describe the scene and its reference, because the store does not know them yet.
+    """
+
+    scene: SceneRecipe
+    detector: PluginRecipe
+    seed: int
+    evaluators: tuple[PluginRecipe, ...]
+    codes: tuple[str, ...] = ()
+    describe_scene: bool = False
+
+    def to_json(self) -> str:
+        """Return the task as text."""
+        return json.dumps(
+            {
+                "scene": self.scene.to_dict(),
+                "detector": self.detector.to_dict(),
+                "seed": self.seed,
+                "evaluators": [recipe.to_dict() for recipe in self.evaluators],
+                "codes": list(self.codes),
+                "describe_scene": self.describe_scene,
+            }
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Read what `to_json` wrote."""
+        values = json.loads(text)
+        return cls(
+            scene=SceneRecipe.from_dict(values["scene"]),
+            detector=PluginRecipe(**values["detector"]),
+            seed=values["seed"],
+            evaluators=tuple(PluginRecipe(**recipe) for recipe in values["evaluators"]),
+            codes=tuple(values["codes"]),
+            describe_scene=values["describe_scene"],
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """What a detection cost, reading of the scene and evaluation excluded.
+
+    Attributes
+    ----------
+    seconds, cpu_seconds : float
+        Wall clock, and processor time of all threads.
+    peak_memory : int
+        Highest resident memory of the process during detection, bytes; 0 where the system does not tell.
+    """
+
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    peak_memory: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """One evaluation as the store keeps it; `summarise` of its evaluator gives the indices back without geometry.
+
+    Attributes
+    ----------
+    evaluator : PluginRecipe
+    code : str
+        Digest of the evaluator's source closure.
+    tallies, samples, values, notes
+        As of `Evaluation`; samples as lists.
+    verdicts : mapping of str to list of dict
+        Rows of both sides without geometry; empty when the evaluator gives none.
+    """
+
+    evaluator: PluginRecipe
+    code: str
+    tallies: Mapping[str, float]
+    samples: Mapping[str, list[float]]
+    values: Mapping[str, float | None]
+    notes: tuple[str, ...]
+    verdicts: Mapping[str, list[dict[str, Any]]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, evaluation: Evaluation, recipe: PluginRecipe, code: str) -> Self:
+        """Take what is kept from an evaluation."""
+        verdicts: dict[str, list[dict[str, Any]]] = {}
+        given = evaluation.verdicts
+        if given is not None:
+            for side, table in (("detection", given.detection_columns), ("reference", given.reference_columns)):
+                names = [name for name in table if name != "geometry"]
+                columns = [[_plain(value) for value in _values(table[name])] for name in names]
+                verdicts[side] = [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
+        return cls(
+            evaluator=recipe,
+            code=code,
+            tallies={name: _plain(value) for name, value in evaluation.tallies.items()},
+            samples={name: np.asarray(array, dtype=np.float64).tolist() for name, array in evaluation.samples.items()},
+            values={name: _plain(value) for name, value in evaluation.values.items()},
+            notes=tuple(evaluation.notes),
+            verdicts=verdicts,
+        )
+
+
+def _values(column: Any) -> list[Any]:
+    """Return the values of a column; those of an array as Python numbers, which are faster to go through."""
+    return column.tolist() if hasattr(column, "tolist") else list(column)
+
+
+def _plain(value: Any) -> Any:
+    """Return a Python number, text or None of what a table or an evaluation holds; not-a-number becomes None."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return None if math.isnan(value) else value
+    return None if value is None or type(value).__name__ == "NAType" else str(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneRecord:
+    """What the store keeps of a scene: enough to evaluate and to draw verdicts without opening it again.
+
+    `picture` is a WebP file over the extent (see `reports.scene_picture`), `point_count` the size of the point cloud.
+    """
+
+    content_hash: str
+    crs: str | None
+    extent: tuple[float, float, float, float]
+    grid: tuple[float, float, float, int, int] | None
+    area: bytes | None
+    reference: tuple[bytes, ...] | None
+    reference_ids: tuple[int, ...] = ()
+    building_ids: tuple[int | str, ...] | None = None
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    point_count: int | None = None
+    picture: bytes | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What became of a task.
+
+    Attributes
+    ----------
+    status : {"ok", "failed", "skipped"}
+    reason : str
+        One sentence of a failure or skip, else empty.
+    traceback : str
+        Of a failure, with the end of what the worker wrote to standard error.
+    cost : Cost
+    detections : tuple of bytes
+        WKB of each raw detection.
+    attributes : mapping of str to list
+        Further columns of the detections.
+    metadata : mapping
+        Facts of the whole set, and repairs.
+    scores : tuple of Score
+    scene : SceneRecord, optional
+    machine : mapping
+        Where it ran.
+    """
+
+    status: Status
+    reason: str = ""
+    traceback: str = ""
+    cost: Cost = field(default_factory=Cost)
+    detections: tuple[bytes, ...] = ()
+    attributes: Mapping[str, list[Any]] = field(default_factory=dict)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+    scores: tuple[Score, ...] = ()
+    scene: SceneRecord | None = None
+    machine: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_bytes(self) -> bytes:
+        """Return a JSON header followed by the geometries."""
+        header = _fields(self)
+        header["cost"] = _fields(self.cost)
+        header["scores"] = [{**_fields(score), "evaluator": score.evaluator.to_dict()} for score in self.scores]
+        blobs = [*self.detections]
+        header["detections"] = len(self.detections)
+        if self.scene is not None:
+            header["scene"] = _fields(self.scene)
+            reference = self.scene.reference
+            blobs += [*(reference or ()), self.scene.area or b"", self.scene.picture or b""]
+            header["scene"]["reference"] = None if reference is None else len(reference)
+            header["scene"]["area"] = header["scene"]["picture"] = None
+        text = json.dumps(header).encode()
+        lengths = np.array([len(blob) for blob in blobs], dtype="<u8").tobytes()
+        return b"".join([struct.pack("<QQ", len(text), len(blobs)), text, lengths, *blobs])
+
+    @classmethod
+    def from_bytes(cls, message: bytes) -> Self:
+        """Read what `to_bytes` wrote."""
+        size, count = struct.unpack_from("<QQ", message)
+        header = json.loads(message[16 : 16 + size])
+        start = 16 + size
+        ends = start + 8 * count + np.cumsum(np.frombuffer(message, "<u8", count, start)).astype(int)
+        begins = [start + 8 * count, *ends[:-1].tolist()]
+        blobs = [message[begin:end] for begin, end in zip(begins, ends.tolist(), strict=False)]
+        number = header["detections"]
+        header["detections"] = tuple(blobs[:number])
+        header["cost"] = Cost(**header["cost"])
+        header["scores"] = tuple(
+            Score(**{**score, "evaluator": PluginRecipe(**score["evaluator"]), "notes": tuple(score["notes"])})
+            for score in header["scores"]
+        )
+        if header["scene"] is not None:
+            record = header["scene"]
+            if record["reference"] is not None:
+                record["reference"] = tuple(blobs[number : number + record["reference"]])
+            record["area"], record["picture"] = (blob or None for blob in blobs[-2:])
+            for name in ("extent", "grid", "reference_ids", "building_ids"):
+                record[name] = None if record[name] is None else tuple(record[name])
+            header["scene"] = SceneRecord(**record)
+        return cls(**header)
+
+
+def _fields(record: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass by name, without going deeper as `dataclasses.asdict` does."""
+    return {field.name: getattr(record, field.name) for field in fields(record)}
+
+
+def footprints_of(
+    wkb: Sequence[bytes],
+    *,
+    crs: str | None,
+    ids: Sequence[int] | None = None,
+    building_ids: Sequence[Any] | None = None,
+    attributes: Mapping[str, Sequence[Any]] | None = None,
+    source: str,
+) -> Footprints:
+    """Return stored geometries, which were checked when they came in, as footprints."""
+    polygons: NDArray[np.object_] = np.empty(len(wkb), dtype=object)
+    polygons[:] = shapely.from_wkb(list(wkb))
+    return Footprints(
+        polygons=polygons,
+        crs=crs,
+        ids=np.arange(len(wkb), dtype=np.int64) if ids is None else np.asarray(ids, dtype=np.int64),
+        building_ids=None if building_ids is None else np.asarray(building_ids),
+        attributes={name: np.asarray(column) for name, column in (attributes or {}).items()},
+        source=source,
+    )

@@ -1,0 +1,188 @@
+"""The worker: does one task in whichever process it is called, and reports failures instead of raising them."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import platform
+import time
+import traceback
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ...core.errors import RoofbenchError
+from ...detectors.base import Detector
+from ...detectors.checks import checked_output
+from ...evaluators.base import Evaluator
+from ...reports.scene_picture import scene_picture
+from ...scenes.geodata.footprints import Footprints
+from ...scenes.scene import Scene
+from ..identity.keys import random_stream_entropy
+from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
+from .memory import highest_memory, reset_highest_memory
+from .tasks import Cost, Outcome, SceneRecord, Score, Task, _plain
+
+__all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream"]
+
+#: Scenes that were opened last; neighbouring tasks of a plan are about one scene.
+_scenes: OrderedDict[str, Scene] = OrderedDict()
+_KEPT_SCENES = 2
+
+
+def detect(scene: Scene, detector: Detector, *, seed: int = 0) -> Footprints:
+    """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector."""
+    visible = scene.for_detection()
+    visible.require(detector.requires)
+    return checked_output(detector.detect(visible, random_stream(seed, scene, detector)), scene, detector.name)
+
+
+def random_stream(seed: int, scene: Scene, detector: Detector) -> np.random.Generator:
+    """Return the generator from which a detector draws on a scene."""
+    return np.random.default_rng(np.random.SeedSequence(random_stream_entropy(seed, scene.name, detector.name)))
+
+
+def execute_text(task: str) -> bytes:
+    """Do a task given as text; the form in which tasks travel between processes."""
+    return execute(Task.from_json(task)).to_bytes()
+
+
+def execute(
+    task: Task,
+    *,
+    scene: Scene | None = None,
+    detector: Detector | None = None,
+    evaluators: Sequence[Evaluator] | None = None,
+) -> Outcome:
+    """Do a task. A failure or a skip is an outcome, too.
+
+    Parameters
+    ----------
+    task : Task
+    scene, detector, evaluators : optional
+        The objects themselves, where task and caller share a process.
+    """
+    started = time.perf_counter(), time.process_time()
+    reset_highest_memory()  # a limit is about this run, not about those before it
+    try:
+        scene = scene if scene is not None else _opened(task.scene)
+        detector = detector if detector is not None else task.detector.detector()
+        if evaluators is None:
+            evaluators = [recipe.evaluator() for recipe in task.evaluators]
+        record = describe(scene) if task.describe_scene else None
+        visible = scene.for_detection()
+        lacking = visible.lacks(detector.requires)
+        if lacking:
+            return Outcome(status="skipped", reason=lacking, scene=record, machine=machine_facts())
+        _read(visible)
+        reset_highest_memory()
+        started = time.perf_counter(), time.process_time()
+        detected = detect(scene, detector, seed=task.seed)
+        cost = _cost_since(started)
+        codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
+        scores = score(detected, scene, list(zip(task.evaluators, codes, evaluators, strict=True)))
+    except Exception as error:
+        told = str(error) if isinstance(error, RoofbenchError) else f"{type(error).__name__}: {error}"
+        if isinstance(error, MemoryError):
+            told = f"out of memory: {error}".rstrip(": ")
+        return Outcome(
+            status="failed",
+            reason=" ".join(told.split())[:500],
+            traceback=traceback.format_exc(),
+            cost=_cost_since(started),
+            machine=machine_facts(),
+        )
+    return Outcome(
+        status="ok",
+        cost=cost,
+        detections=tuple(shapely.to_wkb(detected.polygons).tolist()),
+        attributes={name: [_plain(value) for value in column] for name, column in detected.attributes.items()},
+        metadata={**detected.metadata, **({"repairs": [str(r) for r in detected.repairs]} if detected.repairs else {})},
+        scores=tuple(scores),
+        scene=record,
+        machine=machine_facts(),
+    )
+
+
+def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecipe, str, Evaluator]]) -> list[Score]:
+    """Return what each evaluator says; nothing for a scene without reference."""
+    if scene.reference is None:
+        return []
+    scores = []
+    for recipe, code, evaluator in evaluators:
+        evaluation = evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.evaluation_grid)
+        scores.append(Score.of(evaluation, recipe, code))
+    return scores
+
+
+def describe(scene: Scene) -> SceneRecord:
+    """Return what the store keeps of a scene."""
+    reference, grid, picture = scene.reference, scene.evaluation_grid, scene_picture(scene)
+    labels = None if reference is None or reference.building_ids is None else reference.building_ids
+    return SceneRecord(
+        content_hash=scene.content_hash,
+        crs=scene.crs,
+        extent=scene.extent,
+        grid=None if grid is None else dataclasses.astuple(grid),
+        area=None if scene.area is None else shapely.to_wkb(scene.area),
+        reference=None if reference is None else tuple(shapely.to_wkb(reference.polygons).tolist()),
+        reference_ids=() if reference is None else tuple(reference.ids.tolist()),
+        building_ids=None if labels is None else tuple(_plain(label) for label in labels),
+        facts={name: value for name, value in scene.facts.items() if _is_json(value)},
+        point_count=None if scene.points is None else len(scene.points),
+        picture=None if picture is None else picture.content,
+    )
+
+
+def _is_json(value: Any) -> bool:
+    if isinstance(value, dict):
+        return all(isinstance(name, str) and _is_json(item) for name, item in value.items())
+    if isinstance(value, list | tuple):
+        return all(_is_json(item) for item in value)
+    return value is None or isinstance(value, bool | int | float | str)
+
+
+def _opened(recipe: SceneRecipe) -> Scene:
+    key = repr(recipe)
+    if key not in _scenes:
+        while len(_scenes) >= _KEPT_SCENES:
+            _scenes.popitem(last=False)
+        _scenes[key] = recipe.open()
+    _scenes.move_to_end(key)
+    return _scenes[key]
+
+
+def _read(scene: Scene) -> None:
+    """Read what the detector may ask for before the clock starts: its time is that of detection in memory."""
+    _ = scene.points, scene.image, scene.dem
+
+
+def _cost_since(started: tuple[float, float]) -> Cost:
+    return Cost(
+        seconds=time.perf_counter() - started[0],
+        cpu_seconds=time.process_time() - started[1],
+        peak_memory=highest_memory(),
+    )
+
+
+@cache
+def machine_facts() -> Mapping[str, Any]:
+    """Return where the work is done: host, processor, cores, system, Python."""
+    return {
+        "host": platform.node(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+    }
+
+
+def _processor() -> str:
+    with suppress(OSError, StopIteration), open("/proc/cpuinfo") as facts:
+        return next(line for line in facts if line.startswith("model name")).partition(":")[2].strip()
+    return platform.processor()

@@ -1,0 +1,225 @@
+"""Recipes: how a scene, a detector or an evaluator is made again in another process or on another day.
+
+A recipe is a few words that JSON holds (a folder, a preset with a seed, a name with parameters), so that tasks, plans
+and the store carry recipes and paths instead of megabytes.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal, Self, cast
+
+from ...core.errors import ParameterError, UnsupportedError
+from ...core.registry import Registry
+from ...detectors.base import Detector
+from ...detectors.registry import DETECTORS, make_detector
+from ...evaluators.base import Evaluator
+from ...evaluators.registry import EVALUATORS, make_evaluator
+from ...scenes.builtin import hamlet
+from ...scenes.folder import open_scene
+from ...scenes.scene import Scene
+from ...scenes.synthetic import make_scene
+from ...scenes.synthetic.presets import preset
+from ...scenes.synthetic.presets import preset_names as generator_presets
+from .keys import digest, module_closure, source_closure
+
+__all__ = ["PluginRecipe", "SceneRecipe", "label_of"]
+
+_HAMLET = "hamlet"
+_GENERATOR = "scenes.synthetic"
+_BUILTIN = "scenes.builtin"
+
+
+def label_of(plugin: Detector | Evaluator) -> str:
+    """Return the name with what differs from the defaults: ``ndsm[cell=0.25]``."""
+    changed = ",".join(f"{name}={_short(value)}" for name, value in plugin.changed().items())
+    return f"{plugin.name}[{changed}]" if changed else plugin.name
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True)
+class PluginRecipe:
+    """A detector or evaluator by its selection and its parameters.
+
+    Attributes
+    ----------
+    use : str
+        Registered name, or ``path/to/file.py:Class``.
+    parameters : mapping
+        Every parameter with its value, defaults included.
+    """
+
+    use: str
+    parameters: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, plugin: Detector | Evaluator) -> Self:
+        """Return the recipe of an object, or raise `UnsupportedError` when another process cannot make its class."""
+        kind = type(plugin)
+        registry: Registry = DETECTORS if isinstance(plugin, Detector) else EVALUATORS
+        module = sys.modules.get(kind.__module__)
+        if kind.__module__.startswith("roofbench_plugin_") and module is not None and module.__file__:
+            return cls(f"{Path(module.__file__).resolve()}:{kind.__qualname__}", plugin.values())
+        if plugin.name in registry.names() and registry.get(plugin.name) is kind:
+            return cls(plugin.name, plugin.values())
+        raise UnsupportedError(
+            f"{kind.__qualname__} cannot be made again in another process: put it into a file and select it as "
+            f"file.py:{kind.__name__}, or run with jobs=0, in this process"
+        )
+
+    def detector(self) -> Detector:
+        """Return the detector."""
+        return make_detector(self.use, self.parameters)
+
+    def evaluator(self) -> Evaluator:
+        """Return the evaluator."""
+        return make_evaluator(self.use, self.parameters)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON holds."""
+        return {"use": self.use, "parameters": dict(self.parameters)}
+
+
+@dataclass(frozen=True)
+class SceneRecipe:
+    """A scene by where it comes from.
+
+    Attributes
+    ----------
+    kind : {"folder", "preset", "builtin", "spooled", "memory"}
+        ``spooled`` is a scene of this process that was laid down in a file for other processes; ``memory`` one that
+        stays in this process.
+    name : str
+        Name in tables: ``knox-small-3[tree_density=40]``.
+    place : str
+        Folder, preset or file.
+    seed : int
+        Of a preset and of the built-in scene.
+    parameters : mapping
+        Generator parameters that were set; they are the axes of a sweep.
+    content_hash : str
+        Of a scene in memory or spooled, else empty.
+    """
+
+    kind: Literal["folder", "preset", "builtin", "spooled", "memory"]
+    name: str
+    place: str
+    seed: int = 0
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    content_hash: str = ""
+
+    @classmethod
+    def of_folder(cls, folder: str | Path) -> Self:
+        """Return the recipe of a scene folder; its manifest is read for the name."""
+        path = Path(folder).resolve()
+        return cls("folder", _open_folder(str(path)).name, str(path))
+
+    @classmethod
+    def of_preset(cls, name: str, *, seed: int, parameters: Mapping[str, Any] | None = None) -> Self:
+        """Return the recipe of a synthetic scene.
+
+        Raises
+        ------
+        UnknownNameError, ParameterError
+            No such preset or parameter, or a value outside its range.
+        """
+        values = _checked_parameters(name, parameters or {})
+        axes = ",".join(f"{key}={_short(value)}" for key, value in values.items())
+        full_name = f"{name}-{seed}" + (f"[{axes}]" if axes else "")
+        return cls("builtin" if name == _HAMLET else "preset", full_name, name, seed, values)
+
+    @classmethod
+    def of_scene(cls, scene: Scene) -> Self:
+        """Return the recipe of a scene object, which stays where it is: see `benchmark.spool` for other processes."""
+        return cls("memory", scene.name, "", content_hash=scene.content_hash)
+
+    @property
+    def word(self) -> str:
+        """How the scene is named on the command line: its folder, or ``preset[seed=3,tree_density=40]``."""
+        if self.kind in ("preset", "builtin"):
+            values = {"seed": self.seed, **self.parameters}
+            return f"{self.place}[{','.join(f'{name}={value}' for name, value in values.items())}]"
+        return self.place if self.kind == "folder" else self.name
+
+    @property
+    def group(self) -> str:
+        """What the scene is one of: the preset with its parameters but without its seed, else its own name."""
+        if self.kind not in ("preset", "builtin"):
+            return self.name
+        return self.place + self.name.removeprefix(f"{self.place}-{self.seed}")
+
+    @property
+    def key(self) -> str:
+        """Key of the scene, known without generating it.
+
+        Its name (from which random streams follow) with the content of its files, or with the generator's code, seed
+        and parameters.
+        """
+        if self.kind == "builtin":
+            return digest([self.name, module_closure(_BUILTIN).digest, self.seed])
+        if self.kind == "preset":
+            values = preset(self.place, **self.parameters).values()
+            return digest([self.name, module_closure(_GENERATOR).digest, values, self.seed])
+        return digest([self.name, self.content_hash or _open_folder(self.place).content_hash])
+
+    def open(self) -> Scene:
+        """Return the scene."""
+        if self.kind == "folder":
+            return _open_folder(self.place)
+        if self.kind == "builtin":
+            return hamlet(self.seed)
+        if self.kind == "spooled":
+            from .spool import read_spooled
+
+            return read_spooled(Path(self.place), name=self.name)
+        if self.kind == "memory":
+            raise UnsupportedError(f"scene {self.name!r} lives in the memory of another process: spool it first")
+        return make_scene(self.place, seed=self.seed, **self.parameters)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON holds."""
+        return {
+            "kind": self.kind,
+            "name": self.name,
+            "place": self.place,
+            "seed": self.seed,
+            "parameters": dict(self.parameters),
+            "content_hash": self.content_hash,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Read what `to_dict` wrote."""
+        return cls(**cast("dict[str, Any]", dict(values)))
+
+
+@lru_cache(maxsize=8)
+def _open_folder(folder: str) -> Scene:
+    return open_scene(folder)
+
+
+def _checked_parameters(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return generator parameters as the generator takes them, or raise `ParameterError`."""
+    if name != _HAMLET:
+        recipe = preset(name, **parameters)
+        return {key: getattr(recipe, key) for key in parameters}
+    if parameters:
+        raise ParameterError(f"the built-in scene {name!r} has no parameter {next(iter(parameters))!r}: only a seed")
+    return {}
+
+
+def preset_names() -> list[str]:
+    """Return the names of the scenes that can be generated, the built-in one included."""
+    return [_HAMLET, *generator_presets()]
+
+
+def code_digest(plugin: Detector | Evaluator) -> str:
+    """Return the digest of the source that a plugin depends on."""
+    return source_closure(type(plugin)).digest

@@ -1,0 +1,93 @@
+"""Spooled scenes: scenes of this process laid down in a file, exactly, so that other processes can open them.
+
+A scene folder is for people and rounds coordinates to what LAZ holds; a spooled scene is a numpy archive of the very
+arrays, short-lived and private to one run.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.points import PointCloud
+from ...scenes.geodata.raster import Elevation, Grid, Image
+from ...scenes.scene import Scene
+from .recipes import SceneRecipe
+
+__all__ = ["read_spooled", "spool"]
+
+
+def spool(scene: Scene, folder: Path) -> SceneRecipe:
+    """Write a scene into `folder` and return the recipe that opens it."""
+    file = folder / f"{scene.content_hash[:24]}.npz"
+    arrays: dict[str, Any] = {}
+    about: dict[str, Any] = {"extent": scene.extent, "crs": scene.crs, "content_hash": scene.content_hash}
+    if (cloud := scene.points) is not None:
+        for field in dataclasses.fields(cloud):
+            if (column := getattr(cloud, field.name)) is not None:
+                arrays[f"points.{field.name}"] = column
+    if (image := scene.image) is not None:
+        arrays["image.values"] = image.values
+        if image.valid is not None:
+            arrays["image.valid"] = image.valid
+        about["image"] = {"bands": image.bands, "grid": dataclasses.astuple(image.grid)}
+    if (dem := scene.dem) is not None:
+        arrays["dem.values"] = dem.values
+        about["dem"] = dataclasses.astuple(dem.grid)
+    if (reference := scene.reference) is not None:
+        blobs = shapely.to_wkb(reference.polygons)
+        arrays["reference.wkb"] = np.frombuffer(b"".join(blobs), dtype=np.uint8)
+        arrays["reference.lengths"] = np.array([len(blob) for blob in blobs], dtype=np.int64)
+        arrays["reference.ids"] = reference.ids
+        if reference.building_ids is not None:
+            labels = reference.building_ids
+            arrays["reference.building_ids"] = labels.astype(str) if labels.dtype.kind == "O" else labels
+    if scene.area is not None:
+        about["area"] = shapely.to_wkt(scene.area, rounding_precision=-1)
+    with file.open("wb") as target:
+        np.savez(target, about=np.array(json.dumps(about)), **arrays)
+    return SceneRecipe("spooled", scene.name, str(file), content_hash=scene.content_hash)
+
+
+def read_spooled(file: Path, *, name: str) -> Scene:
+    """Open a spooled scene."""
+    with np.load(file, allow_pickle=False) as archive:
+        about = json.loads(str(archive["about"]))
+        arrays = {key: archive[key] for key in archive.files if key != "about"}
+    columns = {key.partition(".")[2]: value for key, value in arrays.items() if key.startswith("points.")}
+    image = dem = reference = None
+    if "image" in about:
+        grid = Grid(*about["image"]["grid"])
+        image = Image(arrays["image.values"], tuple(about["image"]["bands"]), grid, arrays.get("image.valid"))
+    if "dem" in about:
+        dem = Elevation(arrays["dem.values"], Grid(*about["dem"]))
+    if "reference.wkb" in arrays:
+        ends = np.cumsum(arrays["reference.lengths"])
+        whole = arrays["reference.wkb"].tobytes()
+        blobs = [whole[end - length : end] for end, length in zip(ends, arrays["reference.lengths"], strict=True)]
+        polygons = np.empty(len(blobs), dtype=object)
+        polygons[:] = shapely.from_wkb(blobs)
+        reference = Footprints(
+            polygons=polygons,
+            building_ids=arrays.get("reference.building_ids"),
+            crs=about["crs"],
+            ids=arrays["reference.ids"],
+            source=name,
+        )
+    return Scene(
+        name,
+        about["extent"],
+        crs=about["crs"],
+        points=PointCloud(**columns) if columns else None,
+        image=image,
+        dem=dem,
+        reference=reference,
+        area=shapely.from_wkt(about["area"]) if "area" in about else None,
+        content_hash=about["content_hash"],
+    )

@@ -1,0 +1,73 @@
+"""The file of a results store: how it is opened, and how runs are chosen in it.
+
+Apart from the store, because a listing of runs needs nothing else and must not wait for numeric libraries.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+from ...core.errors import InputError, OutputError
+from .schema import prepare
+
+__all__ = ["connect", "run_filter"]
+
+_BUSY_SECONDS = 60
+
+
+def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
+    """Open a store, made when missing and brought to the current schema; one in a read-only folder to be read.
+
+    Raises
+    ------
+    InputError
+        It must exist and does not, is no store, or is one of a newer version.
+    OutputError
+        It cannot be opened.
+    """
+    if must_exist and not path.is_file():
+        raise InputError(f"{path}: no such results store; 'roofbench run' makes one, or name it with --store")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path} cannot be written: there is no folder {path.parent}")
+    # In a folder that cannot be written SQLite finds no place for its side files: the store is opened to be read.
+    sealed = path.is_file() and not os.access(path.parent, os.W_OK)
+    name = f"{path.resolve().as_uri()}?immutable=1" if sealed else path
+    try:
+        db = sqlite3.connect(name, timeout=_BUSY_SECONDS, isolation_level=None, uri=sealed)
+        db.execute(f"PRAGMA busy_timeout = {_BUSY_SECONDS * 1000}")
+        db.row_factory = sqlite3.Row
+        prepare(db, path)
+        if sealed:
+            return db
+        db.execute("PRAGMA journal_mode = WAL")
+        db.execute("PRAGMA synchronous = NORMAL")
+        db.execute("PRAGMA foreign_keys = ON")
+    except sqlite3.OperationalError as error:
+        raise OutputError(f"{path} cannot be opened as results store: {error}") from error
+    return db
+
+
+def run_filter(
+    *, status: str | None = None, detector: str | None = None, scene: str | None = None
+) -> tuple[str, list[Any]]:
+    """Return the condition and its values that choose runs among ``runs JOIN scenes``.
+
+    Parameters
+    ----------
+    status : {"ok", "failed", "skipped"}, optional
+    detector, scene : str, optional
+        Patterns such as ``ndsm*`` for label and scene name.
+    """
+    conditions, values = ["1"], list[Any]()
+    for column, wanted, comparison in (
+        ("status", status, "="),
+        ("label", detector, "GLOB"),
+        ("scenes.name", scene, "GLOB"),
+    ):
+        if wanted is not None:
+            conditions.append(f"{column} {comparison} ?")
+            values.append(wanted)
+    return " AND ".join(conditions), values

@@ -1,0 +1,283 @@
+"""Reading the results store: runs, scenes, detections, index values and verdicts as plain objects."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ...core.errors import InputError, UnknownNameError
+from ...evaluators.base import Evaluation, Evaluator
+from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.raster import Grid
+from ..execution.tasks import Status, footprints_of
+from ..identity.keys import SourceClosure
+from ..identity.recipes import PluginRecipe, SceneRecipe
+from .database import run_filter
+from .records import RunRow, StoredScene
+
+__all__ = ["StoreReader"]
+
+_SELECT_RUNS = """SELECT runs.id, runs.key, detector, label, parameters AS parameters_text, fingerprint, seed,
+    scenes.name AS scene, recipe AS recipe_text, scene_id, scenes.key AS scene_key, scene_group, version, status,
+    reason, traceback, finished, seconds, cpu_seconds, peak_memory, detected
+    FROM runs JOIN scenes ON scenes.id = scene_id"""
+
+
+class StoreReader:
+    """What can be read from an open store."""
+
+    path: Path
+    _db: sqlite3.Connection
+
+    def last_plan(self) -> Mapping[str, Any]:
+        """Return what was asked for last."""
+        row = self._db.execute("SELECT content FROM plans ORDER BY id DESC LIMIT 1").fetchone()
+        if row is None:
+            raise InputError(
+                f"{self.path} holds no plan to resume: name a suite or scenes; a sweep goes on by its own command"
+            )
+        content: Mapping[str, Any] = json.loads(row["content"])
+        return content
+
+    def statuses(self, keys: Iterable[str]) -> dict[str, tuple[int, Status, str]]:
+        """Return (run id, status, reason) of those keys that are stored."""
+        found = {}
+        for some in _chunks(list(keys)):
+            marks = ",".join("?" * len(some))
+            query = f"SELECT id, key, status, reason FROM runs WHERE key IN ({marks})"  # noqa: S608 - marks only
+            for row in self._db.execute(query, some):
+                found[str(row["key"])] = (int(row["id"]), row["status"], str(row["reason"]))
+        return found
+
+    def evaluated(self, run_ids: Iterable[int], key: str) -> set[int]:
+        """Return which of these runs have an evaluation of that key."""
+        wanted = set(run_ids)
+        rows = self._db.execute("SELECT run_id FROM evaluations WHERE key = ?", (key,))
+        return wanted & {int(row["run_id"]) for row in rows}
+
+    def described_scenes(self) -> set[str]:
+        """Return the keys of the scenes whose content and reference are stored."""
+        return {str(row[0]) for row in self._db.execute("SELECT key FROM scenes WHERE content_hash IS NOT NULL")}
+
+    def latest_like(self, label: str, scene: str, seed: int) -> int | None:
+        """Return the id of the newest run of that detector label on a scene of that name, None when there is none."""
+        query = """SELECT runs.id FROM runs JOIN scenes ON scenes.id = scene_id
+            WHERE label = ? AND scenes.name = ? AND seed = ? ORDER BY runs.id DESC LIMIT 1"""
+        row = self._db.execute(query, (label, scene, seed)).fetchone()
+        return None if row is None else int(row[0])
+
+    def runs(
+        self,
+        *,
+        status: str | None = None,
+        detector: str | None = None,
+        scene: str | None = None,
+        limit: int | None = None,
+    ) -> list[RunRow]:
+        """Return runs, the newest first.
+
+        Parameters
+        ----------
+        status : {"ok", "failed", "skipped"}, optional
+        detector, scene : str, optional
+            Patterns such as ``ndsm*`` for label and scene name.
+        limit : int, optional
+        """
+        where, values = run_filter(status=status, detector=detector, scene=scene)
+        query = f"{_SELECT_RUNS} WHERE {where} ORDER BY runs.id DESC LIMIT ?"
+        return self._run_rows(query, (*values, -1 if limit is None else limit))
+
+    def _run_rows(self, query: str, values: Sequence[Any]) -> list[RunRow]:
+        cursor = self._db.cursor()
+        cursor.row_factory = None  # plain tuples, in the order of the fields
+        return [RunRow._make(row) for row in cursor.execute(query, values)]
+
+    def runs_of(self, keys: Sequence[str]) -> dict[str, RunRow]:
+        """Return the stored runs of these keys, by key."""
+        found: dict[str, RunRow] = {}
+        for some in _chunks(list(keys)):
+            marks = ",".join("?" * len(some))
+            query = f"{_SELECT_RUNS} WHERE runs.key IN ({marks})"
+            found.update((row.key, row) for row in self._run_rows(query, some))
+        return found
+
+    def run(self, name: str | int) -> RunRow:
+        """Return one run by its id or by the first digits of its key (at least four)."""
+        text = str(name)
+        query = f"{_SELECT_RUNS} WHERE "
+        rows = []
+        if text.isdecimal():
+            rows = self._run_rows(query + "runs.id = ?", (int(text),))
+        if not rows and len(text) >= 4 and text.isalnum():
+            rows = self._run_rows(query + "runs.key GLOB ? LIMIT 2", (text + "*",))
+        if len(rows) != 1:
+            found = "several runs" if rows else "no run"
+            raise UnknownNameError(
+                f"{self.path} has {found} called {text!r}: 'roofbench ls' shows their numbers and keys"
+            )
+        return rows[0]
+
+    def scene(self, scene_id: int) -> StoredScene:
+        """Return a scene with its reference."""
+        row = self._db.execute("SELECT * FROM scenes WHERE id = ?", (scene_id,)).fetchone()
+        if row is None:
+            raise UnknownNameError(f"{self.path} has no scene {scene_id}")
+        shapes = self._db.execute(
+            "SELECT id, wkb FROM scene_references WHERE scene_id = ? ORDER BY position", (scene_id,)
+        ).fetchall()
+        recipe = SceneRecipe.from_dict(json.loads(row["recipe"]))
+        reference = None
+        if row["reference_count"] is not None:
+            reference = footprints_of(
+                [shape["wkb"] for shape in shapes],
+                crs=row["crs"],
+                ids=[shape["id"] for shape in shapes],
+                building_ids=None if row["building_ids"] is None else json.loads(row["building_ids"]),
+                source=row["name"],
+            )
+        return StoredScene(
+            id=scene_id,
+            key=row["key"],
+            name=row["name"],
+            recipe=recipe,
+            content_hash=row["content_hash"],
+            crs=row["crs"],
+            extent=None if row["extent"] is None else tuple(json.loads(row["extent"])),
+            grid=None if row["grid"] is None else Grid(*json.loads(row["grid"])),
+            area=None if row["area"] is None else shapely.from_wkb(row["area"]),
+            reference=reference,
+            facts=json.loads(row["facts"] or "{}"),
+            point_count=row["point_count"],
+        )
+
+    def scene_sizes(self) -> dict[int, tuple[int | None, float]]:
+        """Return the number of points (None where not known) and the hectares of every scene that was opened."""
+        rows = self._db.execute("SELECT id, point_count, extent FROM scenes WHERE extent IS NOT NULL")
+        sizes = {}
+        for row in rows:
+            xmin, ymin, xmax, ymax = json.loads(row["extent"])
+            sizes[int(row["id"])] = (row["point_count"], (xmax - xmin) * (ymax - ymin) / 1e4)
+        return sizes
+
+    def scene_hashes(self) -> dict[int, str | None]:
+        """Return the content hash of every scene; None where it was never opened."""
+        return {int(row[0]): row[1] for row in self._db.execute("SELECT id, content_hash FROM scenes")}
+
+    def commands(self) -> list[str]:
+        """Return the commands that asked for runs, in order."""
+        return [str(row[0]) for row in self._db.execute("SELECT command FROM plans ORDER BY id")]
+
+    def verdict_words(self, run_id: int, key: str) -> tuple[list[str], list[str]]:
+        """Return the verdict of each reference and of each detection, in the order of the objects."""
+        query = """SELECT side, verdict FROM verdicts JOIN evaluations ON evaluation_id = evaluations.id
+            WHERE run_id = ? AND key = ? ORDER BY side, position"""
+        rows = self._db.execute(query, (run_id, key)).fetchall()
+        sides = {side: [row[1] for row in rows if row[0] == side] for side in ("reference", "detection")}
+        return sides["reference"], sides["detection"]
+
+    def scene_picture(self, scene_id: int) -> bytes | None:
+        """Return the picture of a scene (WebP over its extent); None when it has none or was never opened."""
+        row = self._db.execute("SELECT content FROM scene_pictures WHERE scene_id = ?", (scene_id,)).fetchone()
+        return None if row is None else bytes(row["content"])
+
+    def reference_counts(self) -> dict[int, int | None]:
+        """Return the number of reference footprints of every scene that was opened; None where it has no reference."""
+        rows = self._db.execute("SELECT id, reference_count FROM scenes WHERE content_hash IS NOT NULL")
+        return {int(row[0]): row[1] for row in rows}
+
+    def detections(self, run_id: int) -> Footprints:
+        """Return the raw detections of a run."""
+        row = self._db.execute(
+            "SELECT label, attributes, crs FROM runs JOIN scenes ON scenes.id = scene_id WHERE runs.id = ?", (run_id,)
+        ).fetchone()
+        shapes = self._db.execute("SELECT id, wkb FROM detections WHERE run_id = ? ORDER BY id", (run_id,)).fetchall()
+        return footprints_of(
+            [shape["wkb"] for shape in shapes],
+            crs=row["crs"],
+            attributes=json.loads(row["attributes"]),
+            source=f"run {run_id} ({row['label']})",
+        )
+
+    def evaluation(self, run_id: int, evaluator: Evaluator, key: str) -> Evaluation | None:
+        """Return the stored evaluation of a run, rebuilt from tallies and samples; None when it was not evaluated."""
+        return self.evaluations([run_id], evaluator, key).get(run_id)
+
+    def evaluations(self, run_ids: Iterable[int], evaluator: Evaluator, key: str) -> dict[int, Evaluation]:
+        """Return the stored evaluations of several runs by one evaluator, by run id."""
+        wanted = set(run_ids)
+        found = {}
+        query = "SELECT run_id, tallies, samples, notes FROM evaluations WHERE key = ?"
+        for row in self._db.execute(query, (key,)):
+            if row["run_id"] in wanted:
+                samples = {
+                    name: np.asarray(values, dtype=np.float64) for name, values in json.loads(row["samples"]).items()
+                }
+                notes = json.loads(row["notes"])
+                found[int(row["run_id"])] = evaluator.summarise(json.loads(row["tallies"]), samples, notes)
+        return found
+
+    def index_values(self, run_ids: Iterable[int], key: str) -> dict[int, dict[str, float | None]]:
+        """Return stored index values by run id and index name."""
+        wanted = set(run_ids)
+        values: dict[int, dict[str, float | None]] = {}
+        query = """SELECT run_id, name, value FROM evaluations JOIN index_values ON evaluation_id = evaluations.id
+            WHERE key = ?"""
+        for run_id, name, value in self._db.execute(query, (key,)):
+            if run_id in wanted:
+                values.setdefault(run_id, {})[name] = value
+        return values
+
+    def verdicts(self, run_id: int, key: str) -> dict[str, list[dict[str, Any]]]:
+        """Return the verdict rows of both sides in the order of the objects, without geometry."""
+        sides: dict[str, list[dict[str, Any]]] = {"detection": [], "reference": []}
+        query = """SELECT side, verdicts.id, verdict, reason, details FROM verdicts
+            JOIN evaluations ON evaluation_id = evaluations.id WHERE run_id = ? AND key = ? ORDER BY side, position"""
+        for row in self._db.execute(query, (run_id, key)):
+            plain = {"id": row["id"], "verdict": row["verdict"], "reason": row["reason"], **json.loads(row["details"])}
+            sides[row["side"]].append(plain)
+        return sides
+
+    def evaluators(self) -> list[tuple[str, PluginRecipe]]:
+        """Return the key and recipe of every evaluator that has judged a run."""
+        rows = self._db.execute("SELECT key, evaluator, parameters FROM evaluations GROUP BY key ORDER BY MIN(id)")
+        return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
+
+    def evaluators_of(self, run_id: int) -> list[tuple[str, PluginRecipe]]:
+        """Return the key and recipe of every evaluator that has judged this run."""
+        query = "SELECT key, evaluator, parameters FROM evaluations WHERE run_id = ? ORDER BY id"
+        rows = self._db.execute(query, (run_id,))
+        return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
+
+    def count_runs(self) -> int:
+        """Return how many runs are stored."""
+        return int(self._db.execute("SELECT COUNT(*) FROM runs").fetchone()[0])
+
+    def code(self, run_id: int) -> SourceClosure:
+        """Return the source closure that a run was made with."""
+        query = "SELECT modules, packages FROM codes JOIN runs ON code_id = codes.id WHERE runs.id = ?"
+        row = self._db.execute(query, (run_id,)).fetchone()
+        return SourceClosure(json.loads(row["modules"]), json.loads(row["packages"]))
+
+    def machine(self, run_id: int) -> Mapping[str, Any]:
+        """Return where a run was done."""
+        query = "SELECT facts FROM machines JOIN runs ON machine_id = machines.id WHERE runs.id = ?"
+        row = self._db.execute(query, (run_id,)).fetchone()
+        facts: Mapping[str, Any] = json.loads(row["facts"]) if row is not None else {}
+        return facts
+
+    def metadata(self, run_id: int) -> Mapping[str, Any]:
+        """Return the facts that the detector gave of its result as a whole."""
+        row = self._db.execute("SELECT metadata FROM runs WHERE id = ?", (run_id,)).fetchone()
+        facts: Mapping[str, Any] = json.loads(row["metadata"])
+        return facts
+
+
+def _chunks(items: list[str], size: int = 500) -> Iterator[list[str]]:
+    for start in range(0, len(items), size):
+        yield items[start : start + size]

@@ -1,0 +1,122 @@
+"""Records of the results store: what identifies a run, and rows as they are read.
+
+A *run key* stands for everything that decides the detections, an *evaluation key* for an evaluator with its parameters
+and code.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import shapely
+
+from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.raster import Grid
+from ..execution.tasks import Status
+from ..identity.keys import SourceClosure, digest
+from ..identity.recipes import PluginRecipe, SceneRecipe
+
+__all__ = ["RunIdentity", "RunRow", "StoredScene", "evaluation_key"]
+
+
+def evaluation_key(recipe: PluginRecipe, code: str) -> str:
+    """Return the key of an evaluator with its parameters and code."""
+    return digest([recipe.use, dict(recipe.parameters), code])
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunIdentity:
+    """The parts of a run's key.
+
+    Attributes
+    ----------
+    detector : PluginRecipe
+    label : str
+        Name with changed parameters, for tables; no part of the key.
+    fingerprint : str
+        Of what the detector reads besides the scene.
+    code : SourceClosure
+    scene : SceneRecipe
+    scene_key : str
+    seed : int
+    """
+
+    detector: PluginRecipe
+    label: str
+    fingerprint: str
+    code: SourceClosure
+    scene: SceneRecipe
+    scene_key: str
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """SHA-256 of the parts."""
+        return digest(
+            {
+                "detector": self.detector.use.rpartition("/")[2],
+                "parameters": dict(self.detector.parameters),
+                "fingerprint": self.fingerprint,
+                "code": self.code.digest,
+                "scene": self.scene_key,
+                "seed": self.seed,
+            }
+        )
+
+
+class RunRow(NamedTuple):
+    """One stored run, without its detections; a tuple, because a listing makes very many of them."""
+
+    id: int
+    key: str
+    detector: str
+    label: str
+    parameters_text: str
+    fingerprint: str
+    seed: int
+    scene: str
+    recipe_text: str
+    scene_id: int
+    scene_key: str
+    scene_group: str
+    version: str
+    status: Status
+    reason: str
+    traceback: str
+    finished: str
+    seconds: float
+    cpu_seconds: float
+    peak_memory: int
+    detected: int | None
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Every parameter of the detector, defaults included."""
+        values: Mapping[str, Any] = json.loads(self.parameters_text)
+        return values
+
+    @property
+    def recipe(self) -> SceneRecipe:
+        """How its scene is opened again."""
+        return SceneRecipe.from_dict(json.loads(self.recipe_text))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredScene:
+    """A scene as the store knows it; `reference` is None until it was opened once, or when it has none."""
+
+    id: int
+    key: str
+    name: str
+    recipe: SceneRecipe
+    content_hash: str | None
+    crs: str | None
+    extent: tuple[float, float, float, float] | None
+    grid: Grid | None
+    area: shapely.Geometry | None
+    reference: Footprints | None
+    facts: Mapping[str, Any]
+    point_count: int | None

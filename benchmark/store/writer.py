@@ -1,0 +1,224 @@
+"""The results store: one SQLite file with runs, raw detections, index values and verdicts.
+
+One transaction a run, so a killed sweep loses at most the runs in flight. Write-ahead logging and a busy timeout let
+several processes write to one store at once. A key that is stored is never computed again, except that failures are
+tried again.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from ...core.errors import OutputError
+from ..execution.tasks import Outcome, SceneRecord, Score
+from ..identity.keys import SourceClosure, canonical
+from ..identity.recipes import SceneRecipe
+from .database import connect
+from .reader import StoreReader
+from .records import RunIdentity, RunRow, StoredScene, evaluation_key
+
+__all__ = ["RunIdentity", "RunRow", "Store", "StoredScene", "evaluation_key"]
+
+
+class Store(StoreReader):
+    """A results store; use it as a context manager.
+
+    Parameters
+    ----------
+    path : path
+        SQLite file, made when missing.
+    must_exist : bool
+        Refuse a file that is not there, for commands that only read.
+    """
+
+    def __init__(self, path: str | Path, *, must_exist: bool = False) -> None:
+        self.path = Path(path)
+        self._db = connect(self.path, must_exist=must_exist)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._db.close()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        try:
+            self._db.execute("BEGIN IMMEDIATE")
+        except sqlite3.OperationalError as error:
+            raise OutputError(f"{self.path} cannot be written: {error}") from error
+        try:
+            yield self._db
+        except BaseException:
+            self._db.execute("ROLLBACK")
+            raise
+        self._db.execute("COMMIT")
+
+    def record(self, identity: RunIdentity, outcome: Outcome, *, version: str, replace: bool = False) -> int:
+        """Store an outcome in one transaction and return the run's id.
+
+        A stored result that is good (``ok`` or ``skipped``) stays when `replace` is false: another process was faster.
+        """
+        with self._transaction() as db:
+            scene_id = self._scene(identity.scene, identity.scene_key, outcome.scene)
+            stored = db.execute("SELECT id, status FROM runs WHERE key = ?", (identity.key,)).fetchone()
+            if stored is not None:
+                if stored["status"] != "failed" and not replace:
+                    return int(stored["id"])
+                db.execute("DELETE FROM runs WHERE id = ?", (stored["id"],))
+            ok = outcome.status == "ok"
+            cursor = db.execute(
+                """INSERT INTO runs (key, detector, label, parameters, fingerprint, seed, scene_id, code_id, machine_id,
+                   version, status, reason, traceback, finished, seconds, cpu_seconds, peak_memory, detected,
+                   attributes, metadata) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)""",
+                (
+                    identity.key,
+                    identity.detector.use,
+                    identity.label,
+                    canonical(dict(identity.detector.parameters)),
+                    identity.fingerprint,
+                    identity.seed,
+                    scene_id,
+                    self._code(identity.code),
+                    self._machine(outcome.machine),
+                    version,
+                    outcome.status,
+                    outcome.reason,
+                    outcome.traceback,
+                    datetime.now(UTC).isoformat(timespec="seconds"),
+                    outcome.cost.seconds,
+                    outcome.cost.cpu_seconds,
+                    outcome.cost.peak_memory,
+                    len(outcome.detections) if ok else None,
+                    canonical(dict(outcome.attributes)),
+                    canonical(dict(outcome.metadata)),
+                ),
+            )
+            run_id = int(cursor.lastrowid or 0)
+            db.executemany(
+                "INSERT INTO detections VALUES (?, ?, ?)",
+                ((run_id, number, wkb) for number, wkb in enumerate(outcome.detections)),
+            )
+            for score in outcome.scores:
+                self._score(run_id, score)
+        return run_id
+
+    def add_score(self, run_id: int, score: Score) -> None:
+        """Store a further evaluation of a stored run; one that is there already stays."""
+        with self._transaction():
+            self._score(run_id, score)
+
+    def _score(self, run_id: int, score: Score) -> None:
+        key = evaluation_key(score.evaluator, score.code)
+        cursor = self._db.execute(
+            """INSERT OR IGNORE INTO evaluations (run_id, key, evaluator, parameters, code, tallies, samples, notes)
+               VALUES (?,?,?,?,?,?,?,?)""",
+            (
+                run_id,
+                key,
+                score.evaluator.use,
+                canonical(dict(score.evaluator.parameters)),
+                score.code,
+                canonical(dict(score.tallies)),
+                canonical(dict(score.samples)),
+                canonical(list(score.notes)),
+            ),
+        )
+        if not cursor.rowcount:
+            return
+        evaluation_id = cursor.lastrowid
+        self._db.executemany(
+            "INSERT INTO index_values VALUES (?, ?, ?)",
+            ((evaluation_id, name, value) for name, value in score.values.items()),
+        )
+        named = ("id", "verdict", "reason")
+        for side, rows in score.verdicts.items():
+            self._db.executemany(
+                "INSERT INTO verdicts VALUES (?,?,?,?,?,?,?)",
+                (
+                    (
+                        evaluation_id,
+                        side,
+                        position,
+                        *(row.get(name) for name in named),
+                        canonical({name: value for name, value in row.items() if name not in named}),
+                    )
+                    for position, row in enumerate(rows)
+                ),
+            )
+
+    def _scene(self, recipe: SceneRecipe, key: str, record: SceneRecord | None) -> int:
+        db = self._db
+        db.execute(
+            "INSERT OR IGNORE INTO scenes (key, name, scene_group, recipe) VALUES (?,?,?,?)",
+            (key, recipe.name, recipe.group, canonical(recipe.to_dict())),
+        )
+        row = db.execute("SELECT id, content_hash FROM scenes WHERE key = ?", (key,)).fetchone()
+        scene_id = int(row["id"])
+        if record is None or row["content_hash"] is not None:
+            return scene_id
+        labels = None if record.building_ids is None else canonical(list(record.building_ids))
+        db.execute(
+            """UPDATE scenes SET content_hash = ?, crs = ?, extent = ?, grid = ?, area = ?,
+               reference_count = ?, building_ids = ?, facts = ?, point_count = ?
+               WHERE id = ?""",
+            (
+                record.content_hash,
+                record.crs,
+                canonical(list(record.extent)),
+                None if record.grid is None else canonical(list(record.grid)),
+                record.area,
+                None if record.reference is None else len(record.reference),
+                labels,
+                canonical(dict(record.facts)),
+                record.point_count,
+                scene_id,
+            ),
+        )
+        if record.picture is not None:
+            db.execute("INSERT OR REPLACE INTO scene_pictures VALUES (?, ?)", (scene_id, record.picture))
+        if record.reference is not None:
+            db.executemany(
+                "INSERT INTO scene_references VALUES (?, ?, ?, ?)",
+                (
+                    (scene_id, position, number, wkb)
+                    for position, (number, wkb) in enumerate(zip(record.reference_ids, record.reference, strict=True))
+                ),
+            )
+        return scene_id
+
+    def _code(self, code: SourceClosure) -> int:
+        self._db.execute(
+            "INSERT OR IGNORE INTO codes (digest, modules, packages) VALUES (?,?,?)",
+            (code.digest, canonical(dict(code.modules)), canonical(dict(code.packages))),
+        )
+        return int(self._db.execute("SELECT id FROM codes WHERE digest = ?", (code.digest,)).fetchone()[0])
+
+    def _machine(self, facts: Mapping[str, Any]) -> int | None:
+        if not facts:
+            return None
+        text = canonical(dict(facts))
+        self._db.execute("INSERT OR IGNORE INTO machines (facts) VALUES (?)", (text,))
+        return int(self._db.execute("SELECT id FROM machines WHERE facts = ?", (text,)).fetchone()[0])
+
+    def save_plan(self, name: str, command: str, content: Mapping[str, Any]) -> None:
+        """Remember what was asked for, so that ``--resume`` needs no suite file."""
+        with self._transaction() as db:
+            text = canonical(dict(content))
+            db.execute("DELETE FROM plans WHERE content = ?", (text,))
+            now = datetime.now(UTC).isoformat(timespec="seconds")
+            db.execute(
+                "INSERT INTO plans (name, command, created, content) VALUES (?,?,?,?)", (name, command, now, text)
+            )

@@ -1,0 +1,178 @@
+"""``roofbench evaluate``: compare two footprint files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    import shapely
+
+    from ..scenes.geodata.footprints import Footprints
+
+__all__ = ["evaluate"]
+
+
+def evaluate(
+    detected: Annotated[str, typer.Argument(help="Detected footprints; 'file.gpkg|layername=NAME' names a layer.")],
+    reference: Annotated[
+        str, typer.Argument(help="Reference footprints, or a scene folder (its reference, area and pixel grid).")
+    ],
+    evaluator: Annotated[
+        str, typer.Option("--evaluator", "-e", help="Evaluator, as name or name[parameter=value].")
+    ] = "threshold-free",
+    matching: Annotated[
+        Literal["nearest", "one-pass", "overlap"] | None, typer.Option(help="How partners are chosen [nearest].")
+    ] = None,
+    area: Annotated[
+        Literal["exact", "pixels"] | None, typer.Option(help="Areas by polygon overlay or by pixel centres [exact].")
+    ] = None,
+    gsd: Annotated[
+        float | None, typer.Option(help="Pixel size in metres, for --area pixels and the RMSE in pixels.")
+    ] = None,
+    minimum_area: Annotated[float | None, typer.Option(help="Ignore references below this area, m2.")] = None,
+    evaluation_area: Annotated[
+        str | None, typer.Option(help="Vector file with the polygon inside which the reference is complete.")
+    ] = None,
+    building_id: Annotated[
+        str | None, typer.Option(help="Reference column that joins the parts of one building.")
+    ] = None,
+    join_gaps: Annotated[
+        float | None, typer.Option(help="Join reference polygons over gaps below this, m: houses of a row to blocks.")
+    ] = None,
+    crs: Annotated[
+        str | None, typer.Option(help="CRS of the files that name none or a wrong one, such as EPSG:25832.")
+    ] = None,
+    form: Annotated[
+        Literal["table", "json", "csv", "md"], typer.Option("--format", "-f", help="How the result is printed.")
+    ] = "table",
+    verdicts: Annotated[
+        Path | None, typer.Option(help="Write a verdict with its reason for every object (.gpkg: two layers).")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw a map of the verdicts (.png, .svg, .pdf).")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace output files that exist.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing on standard error.")] = False,
+) -> None:
+    """Compare detected with reference footprints: 15 indices, and why each object is right or wrong.
+
+    Files may be GeoJSON, GeoPackage, Shapefile, FlatGeobuf or GeoParquet, in a projected CRS in metres.
+    """
+    from ..core.errors import InputError, UnsupportedError
+    from ..evaluators.registry import make_evaluator
+    from ..reports.evaluation_text import format_evaluation
+    from ..scenes.folder import open_scene
+    from ..scenes.geodata.vector_files import read_footprints, read_polygon
+
+    chosen: dict[str, Any] = {"matching": matching, "area": area, "gsd": gsd, "minimum_area": minimum_area}
+    given = {name: str(value) for name, value in chosen.items() if value is not None}
+    judge = make_evaluator(evaluator, given)
+    _check_targets(verdicts, plot, inputs=(detected, reference, evaluation_area), overwrite=overwrite)
+    if building_id is not None and join_gaps is not None:
+        raise InputError(
+            "blocks of joined footprints have no building ids: give --building-id or --join-gaps, not both"
+        )
+    found = read_footprints(detected, crs=crs)
+    scene = open_scene(reference) if Path(reference).is_dir() else None
+    if scene is not None:
+        if scene.reference is None:
+            raise InputError(f"{reference}: the scene has no reference footprints: name a vector file")
+        if building_id is not None:
+            raise InputError(
+                f"{reference} is a scene with building ids of its own: leave out --building-id, or name a vector file"
+            )
+        truth, boundary, grid = scene.reference, scene.area, scene.evaluation_grid
+    else:
+        truth, boundary, grid = read_footprints(reference, crs=crs, building_id=building_id), None, None
+    if evaluation_area:
+        boundary = read_polygon(evaluation_area, crs=crs, common_with=truth)
+    if not quiet:
+        for footprints in (found, truth):
+            for repair in footprints.repairs[:10]:
+                typer.echo(f"{footprints.source}: {repair}", err=True)
+            if len(footprints.repairs) > 10:
+                typer.echo(f"{footprints.source}: {len(footprints.repairs) - 10} more mended or left out", err=True)
+            if not len(footprints):
+                typer.echo(f"{footprints.source}: no footprints", err=True)
+        _warn_of_place(found, truth)
+    if evaluation_area and not any(_reaches(boundary, footprints) for footprints in (found, truth)):
+        raise InputError(
+            f"{evaluation_area} holds none of the footprints, neither detected nor reference: "
+            "check that it shows the same place in the CRS that it names"
+        )
+    if join_gaps is not None:
+        truth = truth.joined(join_gaps)
+    result = judge.evaluate(found, truth, area=boundary, grid=grid)
+    title = f"{_short(detected)} against {_short(reference)}"
+    if verdicts is not None or plot is not None:
+        objects = result.verdicts
+        if objects is None:
+            raise UnsupportedError(f"the evaluator {judge.name!r} gives no verdicts: leave out --verdicts and --plot")
+        if verdicts is not None:
+            from ..reports.verdict_layers import write_verdicts
+
+            write_verdicts(objects, verdicts, crs=truth.crs or found.crs, overwrite=overwrite)
+        if plot is not None:
+            from ..reports.figures import save_figure
+            from ..reports.verdict_map import verdict_figure
+
+            save_figure(verdict_figure(result, title=title, area=boundary), plot, overwrite=overwrite)
+    typer.echo(format_evaluation(result, form, title=title))
+
+
+def _warn_of_place(detected: Footprints, reference: Footprints) -> None:
+    """Say when the two sets cannot be of one place, or when their CRS gives no true areas."""
+    import numpy as np
+    import shapely
+
+    from ..scenes.geodata.crs import scale_warning
+
+    boxes = [shapely.total_bounds(footprints.polygons) for footprints in (detected, reference) if len(footprints)]
+    if not boxes:
+        return
+    low, high = np.max([box[:2] for box in boxes], axis=0), np.min([box[2:] for box in boxes], axis=0)
+    if (low > high).any():
+        told = [f"x {box[0]:.0f} to {box[2]:.0f}, y {box[1]:.0f} to {box[3]:.0f}" for box in boxes]
+        typer.echo(
+            f"warning: {detected.source} lies in {told[0]} and {reference.source} in {told[1]}: no overlap at all, "
+            "check the CRS and the order of the axes",
+            err=True,
+        )
+    stretched = scale_warning(reference.crs or detected.crs, *((boxes[-1][:2] + boxes[-1][2:]) / 2))
+    if stretched:
+        typer.echo(stretched, err=True)
+
+
+def _reaches(area: shapely.Geometry | None, footprints: Footprints) -> bool:
+    """Return whether any footprint meets the area."""
+    import shapely
+
+    return bool(shapely.intersects(area, footprints.polygons).any())
+
+
+def _check_targets(
+    verdicts: Path | None, plot: Path | None, *, inputs: tuple[str | None, ...], overwrite: bool
+) -> None:
+    """Raise `OutputError` for any output that could not be written, before there is a first one."""
+    from ..core.errors import OutputError
+    from ..core.output import check_target
+    from ..scenes.geodata.vector_files import output_driver, split_layer
+
+    read = {split_layer(name)[0].resolve() for name in inputs if name}
+    for target in (verdicts, plot):
+        if target is not None:
+            check_target(target, overwrite)
+            if target.resolve() in read:
+                raise OutputError(f"{target} is an input of this comparison: name another file")
+    if verdicts is not None:
+        output_driver(verdicts)
+    if plot is not None:
+        from ..reports.figures import check_picture
+
+        check_picture(plot)
+
+
+def _short(path: str) -> str:
+    """Return the last part of a path, with its layer."""
+    return path.replace("\\", "/").rstrip("/").rpartition("/")[2]

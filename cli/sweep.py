@@ -1,0 +1,137 @@
+"""``roofbench sweep``: quality along parameters and along what makes scenes hard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..core.errors import OutputError, ParameterError
+from .options import (
+    DetectorSeedsOption,
+    EvaluatorOption,
+    RunOptions,
+    SeedsOption,
+    WordsArgument,
+    messages,
+    suite_from_words,
+    table_console,
+    with_run_options,
+)
+from .progress import run_progress
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from ..benchmark.analysis.sweep import Sweep
+    from ..evaluators.base import Index
+
+
+@with_run_options
+def sweep(
+    detectors: Annotated[str, typer.Argument(help="Detector, or several with commas between.", metavar="DETECTOR")],
+    words: WordsArgument = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=VALUE,VALUE,... or NAME=FROM:TO:STEP; scene.NAME: of the generator; repeat for more."),
+    ] = None,
+    grid: Annotated[bool, typer.Option("--grid", help="Vary all together, not one at a time.")] = False,
+    seeds: SeedsOption = None,
+    detector_seeds: DetectorSeedsOption = 1,
+    index: Annotated[str | None, typer.Option(help="Index that is printed, for instance pixel.quality.")] = None,
+    level: Annotated[
+        float | None, typer.Option(help="Tell where the index passes this level, for instance 0.8 for 80 %.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Tidy table, .csv or .parquet.")] = None,
+    evaluator: EvaluatorOption = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an output file that exists.")] = False,
+    *,
+    options: RunOptions,
+) -> None:
+    """Sweep detector parameters or axes of the generator; what the store holds already is not run again.
+
+    Exit code 3 when runs failed, 4 when nothing could be measured.
+    """
+    from ..benchmark.analysis.leaderboard import incidents_of, rank_index
+    from ..benchmark.analysis.sweep import axis_of, break_downs, make_sweep, run_sweep
+    from ..benchmark.store.writer import Store
+    from ..core.output import check_target
+    from ..core.registry import split_list
+    from ..reports.tables import print_incidents
+
+    execution = options.execution()
+    if output is not None:
+        if output.suffix.lower() not in (".csv", ".parquet"):
+            raise OutputError(f"{output}: unknown file ending {output.suffix!r}: name it .csv or .parquet")
+        check_target(output, overwrite)
+    suite = suite_from_words(words, split_list(detectors), evaluator, seeds=detector_seeds)
+    if seeds is not None:
+        suite = suite.with_seeds(seeds)
+    shown = rank_index(suite.evaluators[0], index)
+    if level is not None and shown.better == "neither":
+        raise ParameterError(f"{shown.key} has no better direction, so no level to break down at")
+    told = messages(options.quiet)
+    with Store(options.store) as opened:
+        planned = make_sweep(suite, [axis_of(text) for text in vary or ()], opened, grid=grid)
+        with run_progress(planned.plan, told) as report:
+            table, rows = run_sweep(planned, opened, execution=execution, progress=report)
+    # The file before the table: who reads that may close the pipe (head).
+    if output is not None:
+        write_table(table, output, overwrite=overwrite)
+        told.print(f"{output}: {len(table)} rows", markup=False)
+    _print(table, planned, shown)
+    if level is not None:
+        first = table[table["evaluator"] == planned.plan.judges[0].label]
+        for found in break_downs(first, planned.axes, shown, level):
+            typer.echo(str(found))
+    incidents = incidents_of(rows)
+    print_incidents(incidents, told)
+    if any(incident.status == "failed" for incident in incidents):
+        raise typer.Exit(3)
+    if not table["scenes"].any():
+        raise typer.Exit(4)
+
+
+def write_table(table: pd.DataFrame, path: Path, *, overwrite: bool) -> None:
+    """Write a tidy table as CSV or Parquet, whole or not at all."""
+    from ..core.output import whole_file
+
+    with whole_file(path, overwrite=overwrite) as scratch:
+        if path.suffix.lower() == ".csv":
+            table.to_csv(scratch, index=False)
+            return
+        try:
+            table.to_parquet(scratch, index=False)
+        except ImportError as error:
+            raise OutputError(f"{path}: Parquet needs pyarrow: pip install 'roofbench[parquet]'") from error
+
+
+def _print(table: pd.DataFrame, planned: Sweep, index: Index) -> None:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from ..reports.tables import column_title, format_cell
+
+    mine = table[table["index"] == index.key]
+    names = [axis.name for axis in planned.axes]
+    drawn = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for name in ("detector", *names, column_title(index), "95 %", "scenes", "failed", "skipped"):
+        drawn.add_column(Text(name), justify="left" if name == "detector" else "right", no_wrap=True)
+    for row in mine.to_dict("records"):
+        values = [_axis_value(row[name]) for name in names]
+        bounds = [format_cell(row[bound], index.unit) for bound in ("low", "high") if row[bound] == row[bound]]
+        mean = format_cell(row["mean"] if row["mean"] == row["mean"] else None, index.unit)
+        counts = [str(row[name]) for name in ("scenes", "failed", "skipped")]
+        drawn.add_row(*map(Text, [row["detector"], *values, mean, "–".join(filter(None, bounds)), *counts]))
+    console = table_console()
+    console.print(drawn)
+    judge = planned.plan.judges[0].label
+    console.print(Text(f"mean of {index.title} over scenes, {judge}, with its bootstrap interval"))
+
+
+def _axis_value(value: object) -> str:
+    if value is None or value != value:
+        return ""
+    return f"{value:g}" if isinstance(value, float) else str(value)

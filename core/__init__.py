@@ -1,0 +1,1 @@
+"""What every room uses: errors, parameters, the registry of plugins, whole-file output."""

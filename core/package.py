@@ -1,0 +1,44 @@
+"""The package itself: its name, folder and version, and where its public names live.
+
+`HOMES` maps each name of the public API to the module that defines it; the root resolves names by it, and content keys
+follow it when a plugin writes ``roofbench.name``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["FOLDER", "HOMES", "NAME", "VERSION"]
+
+NAME = __package__.partition(".")[0]
+FOLDER = Path(__file__).resolve().parents[1]
+VERSION = "0.1.0"
+
+#: Public name to the module that defines it.
+HOMES = {
+    "Detector": "detectors.base",
+    "Elevation": "scenes.geodata.raster",
+    "Evaluation": "evaluators.base",
+    "Evaluator": "evaluators.base",
+    "Footprints": "scenes.geodata.footprints",
+    "Grid": "scenes.geodata.raster",
+    "Image": "scenes.geodata.raster",
+    "Index": "evaluators.base",
+    "PointCloud": "scenes.geodata.points",
+    "RoofbenchError": "core.errors",
+    "Scene": "scenes.scene",
+    "Step": "detectors.base",
+    "detect": "benchmark.session",
+    "evaluate": "evaluators.comparison",
+    "import_scene": "scenes.importing.scene_import",
+    "make_detector": "detectors.registry",
+    "make_evaluator": "evaluators.registry",
+    "make_scene": "scenes.synthetic",
+    "open_scene": "scenes.folder",
+    "parameter": "core.parameters",
+    "pool": "evaluators.comparison",
+    "read_footprints": "scenes.geodata.vector_files",
+    "run": "benchmark.session",
+    "save_scene": "scenes.folder",
+    "write_footprints": "scenes.geodata.vector_files",
+}

@@ -1,0 +1,219 @@
+"""Parameters: the declared, checked and documented fields of detectors, evaluators and scene presets.
+
+A *parameter* is a dataclass field made by `parameter`. It carries its unit, range, meaning and source, so that one
+declaration serves validation, ``-d "name[parameter=value]"`` on the command line, sweeps and the documentation.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import numbers
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any, Self
+
+from .errors import ParameterError
+from .registry import nearest_hint
+
+__all__ = ["Parameter", "Parameterised", "parameter"]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """What is known of one parameter.
+
+    Attributes
+    ----------
+    name : str
+        Field name.
+    type : type
+        float, int, bool or str (the part besides ``None`` of an optional one).
+    optional : bool
+        Whether ``None`` is a value.
+    default : object
+    unit : str
+        ``"m"``, ``"px"``, ``"deg"``; empty for a pure number.
+    minimum, maximum : float, optional
+        Closed range of a number.
+    choices : tuple
+        The values of an enumeration; empty when any is allowed.
+    doc, source : str
+        Meaning in words, and where the value is printed.
+    swept : tuple
+        Values a paper (or we) sweep.
+    """
+
+    name: str
+    type: type
+    optional: bool
+    default: Any
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[Any, ...] = ()
+    doc: str = ""
+    source: str = ""
+    swept: tuple[Any, ...] = ()
+
+    @property
+    def range_text(self) -> str:
+        """The rule in words, for messages and documentation."""
+        if self.choices:
+            return "one of " + ", ".join(map(str, self.choices))
+        unit = f" {self.unit}" if self.unit else ""
+        if self.minimum is not None and self.maximum is not None:
+            return f"from {self.minimum:g} to {self.maximum:g}{unit}"
+        if self.minimum is not None:
+            return f"at least {self.minimum:g}{unit}"
+        if self.maximum is not None:
+            return f"at most {self.maximum:g}{unit}"
+        return {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}[self.type]
+
+    def check(self, value: Any, owner: str) -> Any:
+        """Return `value` as this parameter's type, or raise `ParameterError` naming rule and remedy."""
+        if value is None and self.optional:
+            return None
+        wanted = ParameterError(f"{owner}: {self.name} must be {self.range_text}, not {value!r}")
+        if self.type is bool:
+            if not isinstance(value, bool):
+                raise wanted
+        elif self.type in (int, float):
+            if isinstance(value, bool) or not isinstance(value, numbers.Real):
+                raise wanted
+            if not math.isfinite(value):
+                raise ParameterError(f"{owner}: {self.name} must be a finite number {self.range_text}, not {value!r}")
+            number = float(value)
+            if self.type is int and not number.is_integer():
+                raise wanted
+            value = self.type(number)
+            if self.minimum is not None and value < self.minimum:
+                raise wanted
+            if self.maximum is not None and value > self.maximum:
+                raise wanted
+        elif not isinstance(value, str):
+            raise wanted
+        if self.choices and value not in self.choices:
+            raise wanted
+        return value
+
+    def parse(self, text: str, owner: str) -> Any:
+        """Read a value from the command line, e.g. ``"400"`` or ``"true"``."""
+        plain = text.strip().strip("\"'")
+        if self.optional and plain.lower() in ("none", "null", ""):
+            return None
+        value: Any = plain
+        if self.type is bool:
+            value = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}.get(
+                plain.lower(), plain
+            )
+        elif self.type in (int, float):
+            try:
+                value = float(plain)
+            except ValueError:
+                value = plain
+        return self.check(value, owner)
+
+
+def parameter(
+    default: Any,
+    *,
+    unit: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    choices: tuple[Any, ...] = (),
+    doc: str = "",
+    source: str = "",
+    swept: tuple[Any, ...] = (),
+) -> Any:
+    """Declare a parameter of a detector, evaluator or preset: a dataclass field with unit, range and meaning.
+
+    Examples
+    --------
+    >>> import dataclasses
+    >>> @dataclasses.dataclass(frozen=True, kw_only=True)
+    ... class Threshold(Parameterised):
+    ...     height: float = parameter(2.5, unit="m", minimum=0, doc="height above ground")
+    >>> Threshold(height=-1)
+    Traceback (most recent call last):
+    roofbench.core.errors.ParameterError: Threshold: height must be at least 0 m, not -1
+    """
+    facts = {
+        "unit": unit,
+        "minimum": minimum,
+        "maximum": maximum,
+        "choices": choices,
+        "doc": doc,
+        "source": source,
+        "swept": swept,
+    }
+    return dataclasses.field(default=default, metadata={"parameter": facts})
+
+
+class Parameterised:
+    """Mixin of frozen dataclasses whose fields are parameters: checked on construction, listed on request."""
+
+    def __post_init__(self) -> None:
+        owner = getattr(self, "name", None) or type(self).__name__
+        for name, rule in self.parameters().items():
+            object.__setattr__(self, name, rule.check(getattr(self, name), owner))
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """Return the declared parameters by name, in order of declaration."""
+        cached: dict[str, Parameter] | None = cls.__dict__.get("_parameters")
+        if cached is None:
+            hints = typing.get_type_hints(cls)
+            cached = {}
+            for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+                if "parameter" in field.metadata:
+                    kind, optional = _plain_type(hints[field.name])
+                    cached[field.name] = Parameter(
+                        name=field.name,
+                        type=kind,
+                        optional=optional,
+                        default=field.default,
+                        **field.metadata["parameter"],
+                    )
+            cls._parameters = cached  # type: ignore[attr-defined]
+        return cached
+
+    @classmethod
+    def build(cls, values: Mapping[str, Any] | None = None) -> Self:
+        """Build from a mapping (TOML, keyword arguments); text is parsed, unknown names answered by the nearest."""
+        owner = getattr(cls, "name", None) or cls.__name__
+        known = cls.parameters()
+        checked = {}
+        for name, value in (values or {}).items():
+            if name not in known:
+                raise ParameterError(
+                    f"{owner}: no parameter {name!r}{nearest_hint(name, known)}; it has {', '.join(known) or 'none'}"
+                )
+            rule = known[name]
+            as_text = isinstance(value, str) and rule.type is not str
+            checked[name] = rule.parse(value, owner) if as_text else rule.check(value, owner)
+        return cls(**checked)
+
+    def values(self) -> dict[str, Any]:
+        """Return the parameter values by name."""
+        return {name: getattr(self, name) for name in self.parameters()}
+
+    def changed(self) -> dict[str, Any]:
+        """Return the values that differ from their default."""
+        rules = self.parameters()
+        return {name: value for name, value in self.values().items() if value != rules[name].default}
+
+
+def _plain_type(hint: Any) -> tuple[type, bool]:
+    """Split ``float | None`` into (float, True); a `typing.Literal` counts as the type of its values."""
+    optional = False
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        parts = [part for part in typing.get_args(hint) if part is not type(None)]
+        optional = len(parts) < len(typing.get_args(hint))
+        hint = parts[0]
+    if typing.get_origin(hint) is typing.Literal:
+        hint = type(typing.get_args(hint)[0])
+    if hint not in (bool, int, float, str):
+        raise TypeError(f"a parameter is a bool, int, float or str (or None), not {hint!r}")
+    return hint, optional

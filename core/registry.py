@@ -1,0 +1,182 @@
+"""Names: how things that have one are found, and what is answered when there is no such name.
+
+A *registry* maps names to classes without importing them: built-in ones are given as ``"module:Class"``, others come
+from entry points of installed packages or from a file named by the user (``path/to/file.py:Class``).
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.metadata
+import importlib.util
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import redirect_stdout
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from .errors import InputError, ParameterError, UnknownNameError
+from .package import NAME
+
+__all__ = ["Registry", "nearest_hint", "parse_selection", "split_list"]
+
+_SELECTION = re.compile(r"^(?P<name>[^\[\]]+?)(?:\[(?P<parameters>.*)\])?$", re.DOTALL)
+
+
+def nearest_hint(name: str, known: Iterable[str]) -> str:
+    """Return ``" (did you mean 'x'?)"`` for the nearest known name, or an empty text."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+def parse_selection(text: str) -> tuple[str, dict[str, str]]:
+    """Read ``name[parameter=value,parameter=value]``.
+
+    >>> parse_selection("original[tile_size=400, ground=tile-dem]")
+    ('original', {'tile_size': '400', 'ground': 'tile-dem'})
+    """
+    match = _SELECTION.match(text.strip())
+    if match is None:
+        raise ParameterError(f"cannot read the selection {text!r}: write name or name[parameter=value,...]")
+    values: dict[str, str] = {}
+    for item in (match["parameters"] or "").split(","):
+        if item.strip():
+            key, equals, value = item.partition("=")
+            if not equals:
+                raise ParameterError(f"cannot read {item.strip()!r} in {text!r}: write parameter=value")
+            values[key.strip()] = value.strip()
+    return match["name"].strip(), values
+
+
+def split_list(text: str) -> list[str]:
+    """Split at commas outside brackets.
+
+    >>> split_list("ndsm[cell=0.5,height=2],original")
+    ['ndsm[cell=0.5,height=2]', 'original']
+    """
+    return [part.strip() for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
+
+
+class Registry:
+    """Classes by name, imported when asked for.
+
+    Parameters
+    ----------
+    kind : str
+        What is registered, for messages: ``"detector"``.
+    group : str
+        Entry point group of installed plugins: ``"roofbench.detectors"``.
+    base : type
+        Class that every registered one derives from.
+    builtin : mapping of str to str
+        Name to ``"module:Class"``, the module relative to the roofbench package.
+    """
+
+    def __init__(self, kind: str, group: str, base: type, builtin: Mapping[str, str]) -> None:
+        self.kind = kind
+        self._group = group
+        self._base = base
+        self._builtin = dict(builtin)
+        self._added: dict[str, type[Any]] = {}
+
+    def names(self) -> list[str]:
+        """Return all names: built in, installed, added."""
+        return sorted({*self._builtin, *self._entry_points(), *self._added})
+
+    def get(self, name: str) -> type[Any]:
+        """Return the class called `name`; ``path/to/file.py:Class`` loads and adds it."""
+        if ".py" in name and (":" in name or name.endswith(".py")):
+            return self.add_file(name)
+        if name in self._added:
+            return self._added[name]
+        if name in self._builtin:
+            module, _, attribute = self._builtin[name].partition(":")
+            return self._checked(getattr(importlib.import_module(f"{NAME}.{module}"), attribute), name)
+        found = self._entry_points().get(name)
+        if found is not None:
+            return self._checked(found.load(), name)
+        raise UnknownNameError(
+            f"no {self.kind} called {name!r}{nearest_hint(name, self.names())}; there are {', '.join(self.names())}"
+        )
+
+    def add(self, plugin: type[Any]) -> type[Any]:
+        """Add a class under its ``name``; a name that is taken by another class is refused."""
+        plugin = self._checked(plugin, plugin.__name__)
+        name: str = plugin.name
+        taken = name in self._builtin or name in self._entry_points()
+        other = self._added.get(name)
+        if taken or (other is not None and _origin(other) != _origin(plugin)):
+            raise ParameterError(f"a {self.kind} called {name!r} exists already: give {plugin.__name__} another name")
+        self._added[name] = plugin
+        return plugin
+
+    def add_file(self, selection: str) -> type[Any]:
+        """Load ``path/to/file.py[:Class]``; without a class name the file must hold exactly one of this kind."""
+        path_text, _, attribute = selection.partition(".py")
+        path, attribute = Path(path_text + ".py"), attribute.lstrip(":")
+        module = _load_file(path, self.kind)
+        if attribute:
+            if not hasattr(module, attribute):
+                raise UnknownNameError(f"{path} has no class {attribute!r}{nearest_hint(attribute, vars(module))}")
+            return self.add(getattr(module, attribute))
+        found = self._defined_in(module)
+        if len(found) != 1:
+            raise UnknownNameError(f"{path} holds {len(found)} {self.kind} classes, not one: name it as {path}:Class")
+        return self.add(found[0])
+
+    def add_all(self, path: Path) -> list[type[Any]]:
+        """Load a Python file and add every class of this kind that it defines; there may be none."""
+        return [self.add(plugin) for plugin in self._defined_in(_load_file(path, self.kind))]
+
+    def _defined_in(self, module: ModuleType) -> list[type[Any]]:
+        return [
+            value
+            for value in vars(module).values()
+            if isinstance(value, type) and issubclass(value, self._base) and value.__module__ == module.__name__
+        ]
+
+    def _entry_points(self) -> dict[str, importlib.metadata.EntryPoint]:
+        return _installed(self._group)
+
+    def _checked(self, plugin: Any, name: str) -> type[Any]:
+        if not (isinstance(plugin, type) and issubclass(plugin, self._base)):
+            raise ParameterError(f"{name} is not a {self.kind}: it must derive from roofbench.{self._base.__name__}")
+        if not isinstance(getattr(plugin, "name", None), str):
+            raise ParameterError(f"{name} has no name: set the class attribute 'name'")
+        return plugin
+
+
+@cache
+def _installed(group: str) -> dict[str, importlib.metadata.EntryPoint]:
+    """Return the entry points of a group; the search reads a file of every installed package, so it is done once."""
+    return {entry.name: entry for entry in importlib.metadata.entry_points(group=group)}
+
+
+def _origin(plugin: type[Any]) -> tuple[str, str]:
+    return plugin.__module__, plugin.__qualname__
+
+
+def _load_file(path: Path, kind: str) -> ModuleType:
+    """Import a Python file the user names; its module name holds its full path so that two files never mix."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; name the Python file that holds the {kind}")
+    name = "roofbench_plugin_" + re.sub(r"\W", "_", str(path.resolve()))
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        # Standard output is for data: what a plugin prints is a message.
+        with redirect_stdout(sys.stderr):
+            spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        raise InputError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
+    return module

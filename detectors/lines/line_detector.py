@@ -1,0 +1,426 @@
+"""What both line detectors share: their parameters, the rasters they read, and the steps before and after the lines.
+
+Parameters that a paper prints in pixels of its images are declared in those (`PAPER_PIXEL`, 0.15 m) or in metres, never
+in pixels of the scene at hand, so that the same values serve any ground sampling distance.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.parameters import parameter
+from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.raster import Image
+from ...scenes.scene import Scene
+from ..base import Detector, Step
+from .adjustment import by_length, rotate
+from .boxes import Boxes, box_corners, lengths, prefix_sums, widths
+from .colours import Colours
+from .contours import trace_shapes
+from .corners import find_corners
+from .duplicates import find_duplicates
+from .extension import Cover, Growth, extend_lines, last_step
+from .final_rectangles import FinalRules, final_rectangles
+from .initial_rectangles import INSIDE, initial_rectangles
+from .masks import build_masks, ground_heights, point_spacing, sunken
+from .rasters import Rasters
+from .segments import Segments, beyond_coverage, fit_segments, inside_first
+from .trace import Fate, Trace
+from .vegetation import vegetation_prefix
+
+if TYPE_CHECKING:
+    from .image_edges import ImageEdges
+    from .texture import Texture
+
+__all__ = ["PAPER_PIXEL", "LineDetector"]
+
+#: Ground sampling distance that the 2010 paper's pixel counts refer to, metres.
+PAPER_PIXEL = 0.15
+#: The edge of a mask lies half a pixel outside the centres of its border pixels.
+_OUTSET = 0.5
+#: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
+_CURVE_STEP = 0.3
+#: Least length of a side that is tested at a time, point spacings: a first step then holds ten points or more.
+_EXTENSION_PART = 3.5
+#: Root mean square distance from its line at which a segment must have missed a corner: point spacings, and pixels,
+#: whose staircase is no corner.
+_MISSED_CORNER, _STAIRCASE = 0.4, 0.5
+#: Threshold that no mean reaches: entropy is not used.
+_NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineDetector(Detector):
+    """Parameters and shared steps of the detectors `original` and `improved`."""
+
+    requires: ClassVar[tuple[str, ...]] = ("points", "colour", "dem")
+
+    ground: str = parameter(
+        "tile-dem",
+        choices=("tile-dem", "tile-mode", "point-dem"),
+        doc="ground height: mean DEM of the tile, most frequent height of the tile's points, or DEM under the point",
+        source="2010, 3.2; conference version, 3.1; 2011, 3.1",
+    )
+    below_ground: float = parameter(
+        0.1, minimum=0, maximum=1, swept=(0.05, 0.1, 0.2, 1.0),
+        doc="largest share of the points around that may lie below the DEM under them before it is lowered "
+        "(`ground=point-dem`); 1 never lowers it, as printed",
+        source="2011, 3.1; reading",
+    )  # fmt: skip
+    tile_size: float = parameter(
+        450, unit="px of 0.15 m", minimum=20, swept=(400, 450, 500, 550, 600),
+        doc="side of the tiles that a ground height is estimated for", source="2010, 3.2 and 4.4.1",
+    )  # fmt: skip
+    height: float = parameter(
+        2.5, unit="m", minimum=0, doc="least height above ground of a building", source="2010, 3.2"
+    )
+    marking: str = parameter(
+        "nearest", choices=("nearest", "squares"),
+        doc="what a place in the masks is: what the nearest point is, or the printed square around each point",
+        source="2010, 3.2; reading",
+    )  # fmt: skip
+    neighbourhood: float | None = parameter(
+        None, unit="m", minimum=0,
+        doc="side of the square that a point marks, and how far off the nearest one counts; none: 1.5 point spacings, "
+        "the paper's 5 px of 0.15 m",
+        source="2010, 3.2",
+    )  # fmt: skip
+    minimum_side: float = parameter(
+        3.0, unit="m", minimum=0, doc="least length and width of a building; shorter edges and lines are dropped",
+        source="2010, 3.3.1",
+    )  # fmt: skip
+    smoothing: float = parameter(
+        3.0, unit="curve points", minimum=0, doc="sigma of the Gaussian along a curve", source="2010, 3.3.1"
+    )
+    curve_step: float | None = parameter(
+        None, unit="m", minimum=0.01,
+        doc="distance of curve points; none: 0.3 point spacings, a third of a pixel or more",
+        source="2010, 3.3.1: pixels of 0.15 m at a spacing of 0.5 m; reading",
+    )  # fmt: skip
+    corner_product: float = parameter(
+        0.2, minimum=0, maximum=1, doc="least product of the three normalised accumulated chord distances",
+        source="CPDA, 2009",
+    )  # fmt: skip
+    corner_angle: float = parameter(
+        157.0, unit="deg", minimum=90, maximum=180,
+        doc="interior angles from this to its explement (203) are no corner", source="CPDA, 2009",
+    )  # fmt: skip
+    missed_corner: float | None = parameter(
+        None, unit="m", minimum=0.01,
+        doc="RMS distance of a curve from its line above which it is split; none: 0.4 point spacings, half a pixel "
+        "or more",
+        source="not in the print; 1000 is none",
+    )  # fmt: skip
+    inside_reach: float = parameter(
+        3.0,
+        unit="px of 0.15 m",
+        minimum=0,
+        doc="distance of the inside point from its line",
+        source="2010, 3.3.1; reading",
+    )
+    vegetation: str = parameter(
+        "green-red", choices=("green-red", "pseudo-ndvi"),
+        doc="index on images without near infrared: 2(G-R)/(G+R), or the printed (R-G)/(R+G)",
+        source="2010, 4.3; reading",
+    )  # fmt: skip
+    vegetation_threshold: float = parameter(
+        48.0, minimum=0, maximum=255, swept=(32, 40, 48, 56, 64),
+        doc="mean vegetation index (0..255) above which a place is vegetation", source="2010, 3.3.1 and 4.4.1",
+    )  # fmt: skip
+    band_width: float = parameter(
+        3.0, unit="m", minimum=0.1, doc="width of the rectangle beside a line whose vegetation index is tested",
+        source="2010, 3.3.1",
+    )  # fmt: skip
+    adjustment_angle: float = parameter(
+        22.5, unit="deg", minimum=0, maximum=45, doc="largest rotation of a line to be parallel or perpendicular",
+        source="2010, 3.3.2",
+    )  # fmt: skip
+    adjustment_radius: float = parameter(
+        50.0, unit="m", minimum=0, doc="largest distance of a line and its reference when turned to neighbours",
+        source="2010, 3.3.2",
+    )  # fmt: skip
+    extension: float = parameter(
+        3.0, unit="m", minimum=0.1, doc="depth and first step of the extension of lines and initial rectangles",
+        source="2010, 3.3.2",
+    )  # fmt: skip
+    extension_stop: float | None = parameter(
+        None, unit="m", minimum=0.01,
+        doc="step below which a line or initial rectangle stands; none: 0.8 point spacings",
+        source="2010, 3.3.2: 0.4 m at a spacing of 0.5 m",
+    )  # fmt: skip
+    extension_black: float = parameter(
+        0.7, minimum=0, maximum=1, swept=(0.6, 0.7, 0.8, 0.9), doc="least share of black in a step of that extension",
+        source="2010, 3.3.2",
+    )  # fmt: skip
+    extension_part: float | None = parameter(
+        None, unit="m", minimum=0.1,
+        doc="least length of a side that is tested at a time; none: the first step, 3.5 point spacings or more; 1000: "
+        "the whole side",
+        source="2010, 3.3.2: 3 m, and 3.3.3: the same technique for sides; reading",
+    )  # fmt: skip
+    initial_width: float = parameter(
+        1.5, unit="m", minimum=0.1, doc="width of a rectangle before it is extended", source="2010, 3.3.3"
+    )
+    inside_margin: float | None = parameter(
+        None, unit="m", minimum=0,
+        doc="how far outside a rectangle a line counts as in it; none: last step of its extension + a pixel; printed 0",
+        source="2010, 3.3.3; reading",
+    )  # fmt: skip
+    inside_share: float = parameter(
+        0.9, minimum=0, maximum=1, doc="share of its length by which a line whose midpoint is in a rectangle is in it",
+        source="2010, 3.3.3; reading",
+    )  # fmt: skip
+    reduction: float = parameter(
+        0.15, minimum=0, maximum=0.9, swept=(0.10, 0.15, 0.20, 0.25, 0.30),
+        doc="share by which length and width of initial rectangles shrink", source="2010, 3.4.1 and 4.4.1",
+    )  # fmt: skip
+    part_share: float = parameter(
+        0.97,
+        minimum=0,
+        maximum=1,
+        doc="share of a part of a colour histogram that its range holds",
+        source="2010, 3.4.1",
+    )
+    total_share: float = parameter(
+        0.90, minimum=0, maximum=1, doc="share of the rectangle that the parts used hold", source="2010, 3.4.1"
+    )
+    strip: float = parameter(
+        0.35, unit="m", minimum=0.01, doc="first step of the final extension", source="2010, 3.4.2"
+    )
+    colour_similarity: float = parameter(
+        0.4, minimum=0, maximum=1, swept=(0.2, 0.3, 0.4, 0.5, 0.6),
+        doc="least share of a step in the dominant range of Y, I and Q each", source="2010, 3.4.2 and 4.4.1",
+    )  # fmt: skip
+    black_share: float = parameter(
+        0.9, minimum=0, maximum=1, swept=(0.6, 0.7, 0.8, 0.9, 1.0),
+        doc="least share of a step that is black in the secondary mask", source="2010, 3.4.2 and 4.4.1",
+    )  # fmt: skip
+    gap_share: float = parameter(
+        0.1, minimum=0, maximum=1, doc="primary black below which the next rise ends a side", source="2010, 3.4.2"
+    )
+    rise: float = parameter(
+        0.1, minimum=0, maximum=1, doc="largest increase of primary black that is no rise; the print has none",
+        source="2010, 3.4.2; reading",
+    )  # fmt: skip
+    compare: str = parameter(
+        "shrunk", choices=("shrunk", "whole"),
+        doc="size of an initial rectangle in the test that drops it when it lies wholly inside a final one",
+        source="2010, 3.4; reading",
+    )  # fmt: skip
+    new_share: float = parameter(
+        0.1, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
+        doc="least share of a final rectangle outside the larger ones against which it is turned; with less it is the "
+        "same building seen again; 0 keeps all, as printed",
+        source="2010, 3.4: parts adjoin at right angles; reading",
+    )  # fmt: skip
+    parallel_angle: float = parameter(
+        3.0, unit="deg", minimum=0, maximum=45,
+        doc="largest angle between final rectangles that count as parallel or perpendicular",
+        source="2010, 3.4; reading",
+    )  # fmt: skip
+
+    def run(self, rasters: Rasters) -> Trace:
+        """Run all steps that follow the masks, keeping the intermediate results."""
+        segments, fates = self._fitted_lines(rasters)
+        leafy, rescued = self._tree_edges(rasters, segments.lines)
+        rescued &= fates == Fate.RECTANGLE
+        fates[(fates == Fate.RECTANGLE) & leafy] = Fate.VEGETATION
+
+        rotation = np.full(len(segments), np.nan)
+        alive = np.flatnonzero(fates == Fate.RECTANGLE)
+        rotation[alive] = self._rotation(segments.take(alive), rasters.gsd)
+        fates[alive[np.isnan(rotation[alive])]] = Fate.UNADJUSTED
+        alive = np.flatnonzero(fates == Fate.RECTANGLE)
+        lines = segments.lines.copy()
+        lines[alive] = self._extended(rasters, rotate(lines[alive], rotation[alive]))
+
+        edges = self._image_edges(rasters)
+        votes = self._votes(lines, rotation, edges, segments.shapes, fates, rasters.gsd)
+        initial, initial_fates, candidates = self._rectangles(rasters, lines, fates)
+        texture = self._judged(candidates, edges, rasters)
+        buildings = np.ones(len(candidates), dtype=np.bool_) if texture is None else np.any(texture.passed, axis=1)
+        duplicates = np.zeros(len(candidates), dtype=np.bool_)
+        duplicates[buildings] = find_duplicates(
+            candidates[buildings], least=self.new_share, tolerance=np.radians(self.parallel_angle)
+        )
+        return Trace(
+            image=rasters.image,
+            masks=rasters.masks,
+            vegetation=rasters.cover.vegetation,
+            fitted=segments.lines,
+            lines=lines,
+            shapes=segments.shapes,
+            fates=fates,
+            rescued=rescued,
+            initial=initial,
+            initial_fates=initial_fates,
+            candidates=candidates,
+            duplicates=duplicates,
+            kept=buildings & ~duplicates,
+            votes=votes,
+            texture=texture,
+        )
+
+    @abstractmethod
+    def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which lines are tree edges, and which are green but not."""
+
+    @abstractmethod
+    def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
+        """Return the angle that adjusts each line, radians, NaN for lines that are dropped."""
+
+    def _image_edges(self, rasters: Rasters) -> ImageEdges | None:
+        """Return the edges of the image; none where nothing asks for them."""
+        return None
+
+    def _votes(
+        self,
+        lines: Boxes,
+        rotation: NDArray[np.float64],
+        edges: ImageEdges | None,
+        shapes: NDArray[np.int64],
+        fates: NDArray[np.int64],
+        gsd: float,
+    ) -> NDArray[np.float64] | None:
+        """Return the votes of each line, none without voting; write the fates of those outvoted into `fates`."""
+        return None
+
+    def _judged(self, candidates: Boxes, edges: ImageEdges | None, rasters: Rasters) -> Texture | None:
+        """Return the texture of the candidates, none where they are not judged by it."""
+        return None
+
+    def trace(self, scene: Scene) -> Trace:
+        """Detect, and return every intermediate result."""
+        scene.require(self.requires)
+        return self.run(self._rasters(scene))
+
+    def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
+        """Return the rectangles of the buildings; overlapping ones are parts of one building, or one seen twice."""
+        found = self.trace(scene)
+        corners = box_corners(found.final)
+        x, y = found.grid.to_world(corners[..., 1], corners[..., 0])
+        rectangles = np.stack([x, y], axis=-1)
+        return Footprints.from_rectangles(rectangles, crs=scene.crs, metadata=found.counts(), source=self.name)
+
+    def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
+        """Yield pictures of the masks, the lines, the rectangles and, where used, the votes and the histograms."""
+        from .drawing import draw_steps
+
+        yield from draw_steps(self.trace(scene))
+
+    def _rasters(self, scene: Scene) -> Rasters:
+        points, image = scene.points, scene.image
+        assert points is not None
+        assert image is not None
+        grid = image.grid
+        tile_side = self.tile_size * PAPER_PIXEL
+        spacing = point_spacing(points, grid)
+        ground = (
+            ground_heights(points, scene.dem, method=self.ground, tile_side=tile_side) if len(points) else np.empty(0)
+        )
+        if self.ground == "point-dem" and self.below_ground < 1 and len(points):
+            ground += sunken(points, ground, self.below_ground)
+        masks = build_masks(
+            points,
+            ground + self.height,
+            grid,
+            neighbourhood=1.5 * spacing if self.neighbourhood is None else self.neighbourhood,
+            nearest=self.marking == "nearest",
+        )
+        cover = Cover(prefix_sums(masks.primary), vegetation_prefix(image, self.vegetation), self._entropy(image))
+        bands = [image.bands.index(name) for name in ("red", "green", "blue")]
+        rgb = image.values[:3] if bands == [0, 1, 2] else image.values[bands]
+        return Rasters(image, masks, cover, Colours(rgb, float(np.iinfo(rgb.dtype).max)), spacing)
+
+    def _entropy(self, image: Image) -> NDArray[np.int32]:
+        return _NO_ENTROPY
+
+    def _growth(self, rasters: Rasters) -> Growth:
+        stop = 0.8 * rasters.spacing if self.extension_stop is None else self.extension_stop
+        part = self.extension_part or max(self.extension, _EXTENSION_PART * rasters.spacing)
+        return Growth(
+            step=self.extension / rasters.gsd,
+            least_step=max(stop / rasters.gsd, 1.0),
+            black_share=self.extension_black,
+            part=part / rasters.gsd,
+            vegetation=self.vegetation_threshold,
+            entropy=self._entropy_limit(),
+        )
+
+    def _entropy_limit(self) -> float:
+        return 0.0
+
+    def _fitted_lines(self, rasters: Rasters) -> tuple[Segments, NDArray[np.int64]]:
+        """Return the lines around the black shapes, and their fates so far."""
+        gsd = rasters.gsd
+        black = rasters.masks.primary
+        curves = trace_shapes(black, shortest=self.minimum_side, gsd=gsd, sample=self._sample(rasters))
+        points, corners, offsets = find_corners(
+            curves,
+            sigma=self.smoothing,
+            product=self.corner_product,
+            straight=(self.corner_angle, 360.0 - self.corner_angle),
+        )
+        missed = self.missed_corner or max(_MISSED_CORNER * rasters.spacing, _STAIRCASE * gsd)
+        segments = fit_segments(
+            curves, points, corners, offsets, shortest=self.minimum_side / gsd - 2 * _OUTSET, deviation=missed / gsd
+        )
+        reach = max(1.0, self.inside_reach * PAPER_PIXEL / gsd)
+        lines = inside_first(segments.lines, black, reach=reach, outset=_OUTSET)
+        fates = np.full(len(lines), Fate.RECTANGLE, dtype=np.int64)
+        fates[beyond_coverage(lines, rasters.masks.coverage, reach)] = Fate.BORDER
+        return Segments(lines, segments.shapes), fates
+
+    def _rectangles(
+        self, rasters: Rasters, lines: Boxes, fates: NDArray[np.int64]
+    ) -> tuple[Boxes, NDArray[np.int64], Boxes]:
+        """Return initial rectangles of the lines still alive, the final one of each (-1: none), and the final ones.
+
+        The fates of lines that make no rectangle are written into `fates`.
+        """
+        gsd = rasters.gsd
+        alive = np.flatnonzero(fates == Fate.RECTANGLE)
+        growth = self._growth(rasters)
+        initial, made = initial_rectangles(
+            rasters.cover,
+            growth,
+            lines[alive],
+            by_length(lines[alive]),
+            self.initial_width / gsd,
+            self.minimum_side / gsd,
+            last_step(growth) + 1.0 if self.inside_margin is None else self.inside_margin / gsd,
+            self.inside_share,
+        )
+        fates[alive[made < 0]] = np.where(made[made < 0] == INSIDE, Fate.INSIDE, Fate.NARROW)
+        rules = FinalRules(
+            reduction=self.reduction,
+            part_share=self.part_share,
+            total_share=self.total_share,
+            strip=max(self.strip / gsd, 2.0),
+            least_strip=1.0,
+            colour_share=self.colour_similarity,
+            black_share=self.black_share,
+            gap_share=self.gap_share,
+            rise=self.rise,
+            whole_initial=self.compare == "whole",
+        )
+        longest_first = np.argsort(-np.maximum(lengths(initial), widths(initial)), kind="stable")
+        final, final_fates = final_rectangles(
+            rasters.colours, rasters.masks.primary, rasters.masks.secondary, rules, initial, longest_first
+        )
+        return initial, final_fates, final
+
+    def _sample(self, rasters: Rasters) -> float:
+        if self.curve_step is not None:
+            return self.curve_step
+        return max(_CURVE_STEP * rasters.spacing, rasters.gsd / 3)
+
+    def _extended(self, rasters: Rasters, lines: Boxes) -> Boxes:
+        extended: Boxes = extend_lines(rasters.cover, self._growth(rasters), lines, self.extension / rasters.gsd)
+        return extended

@@ -1,0 +1,1 @@
+"""The plain baseline `ndsm`: a height threshold."""

@@ -1,0 +1,288 @@
+"""The plain baseline: what is high, not a tree, and large enough, is a building.
+
+1. Points are gathered on a grid as fine as their spacing allows; heights are above the DEM, else above a ground
+   surface filtered from the points.
+2. A cell is *high* where at least half of its points are above the height threshold.
+3. Each cue that the scene offers (multiple returns, roughness, penetration, image vegetation) says between -1 (roof)
+   and +1 (tree) how a cell looks; the mean is averaged over the neighbourhood, and a high cell where it is negative is
+   *roof*.
+4. Small holes are filled, and an opening with a disc cuts off what is narrow.
+5. The outline is traced to a fraction of a cell, small or tree-like footprints go, and the rest gets straight walls
+   along its main directions, or is replaced by its minimum-area rectangle.
+
+Nothing is learned and nothing is random: the same points give the same footprints.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...core.parameters import parameter
+from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.points import PointCloud
+from ...scenes.geodata.raster import Grid
+from ...scenes.ground.heights import ground_of, heights_above_ground
+from ...scenes.scene import Scene
+from ..base import Detector, Step
+from ..shared.cues import CellCues, cell_cues, greenness
+from ..shared.morphology import opened, without_holes
+from ..shared.outlines import coverage_of_mask, minimum_rectangles, trace
+from ..shared.regularise import regularise
+
+__all__ = ["NDSM", "Work"]
+
+_Floats = NDArray[np.float32]
+_Mask = NDArray[np.bool_]
+
+#: Name of the image's cue, and its weight besides the laser's, which weigh 1: roofs may be green, autumn trees are
+#: not, and roofs lean in the image.
+_IMAGE, _IMAGE_WEIGHT = "image vegetation", 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class NDSM(Detector):
+    """Height above ground with vegetation cues, opening and traced outlines: the plain baseline."""
+
+    name = "ndsm"
+    requires = ("points",)
+
+    height: float = parameter(
+        2.5,
+        unit="m",
+        minimum=0.5,
+        maximum=20,
+        doc="height above ground from which on a point is high",
+        source="Awrangjeb 2010, section 3.2",
+        swept=(1.5, 2.0, 2.5, 3.0),
+    )
+    cell: float | None = parameter(
+        None, unit="m", minimum=0.1, maximum=5, doc="cell size; none: 1.4 times the point spacing, 0.25 to 2 m"
+    )
+    dem: bool = parameter(True, doc="take the ground from the DEM where there is one; false: always from the points")
+    multiple_share: float | None = parameter(
+        0.5, minimum=0, maximum=1, doc="share of multiple returns from which on a cell looks like a tree; none: unused"
+    )
+    roughness: float | None = parameter(
+        0.25,
+        unit="m",
+        minimum=0.01,
+        maximum=5,
+        doc="deviation from a local plane from which on a cell looks like a tree; none: unused",
+    )
+    window: float = parameter(
+        1.5,
+        unit="m",
+        minimum=0.2,
+        maximum=20,
+        doc="width of the windows in which planes are fitted, at least two cells",
+    )
+    penetration: float | None = parameter(
+        0.35,
+        minimum=0,
+        maximum=1,
+        doc="share of points below the height from which on a high cell looks like a tree; none: unused",
+    )
+    ndvi: float | None = parameter(
+        0.15, minimum=-1, maximum=1, doc="(NIR - R) / (NIR + R) of vegetation, with a NIR band; none: unused"
+    )
+    green_red: float | None = parameter(
+        0.05, minimum=-1, maximum=1, doc="(G - R) / (G + R) of vegetation, without a NIR band; none: unused"
+    )
+    darkest: float = parameter(
+        0.1, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel say nothing: shadow"
+    )
+    smoothing: float = parameter(
+        0.75, unit="m", minimum=0, maximum=5, doc="sigma of the Gaussian over which the likeness to a tree is averaged"
+    )
+    opening: float = parameter(
+        1.0, unit="m", minimum=0, maximum=10, doc="radius of the opening: narrower parts are cut off"
+    )
+    largest_hole: float = parameter(4.0, unit="m2", minimum=0, doc="holes up to this area are filled")
+    most_tree_like: float = parameter(
+        -0.4, minimum=-1, maximum=1, doc="footprints whose cells look more like a tree on average are dropped"
+    )
+    smallest_area: float = parameter(8.0, unit="m2", minimum=0, doc="smaller footprints are dropped")
+    outline: Literal["polygon", "rectangle"] = parameter(
+        "polygon",
+        choices=("polygon", "rectangle"),
+        doc="traced polygon with straight walls, or rectangle of least area around it",
+    )
+    tolerance: float | None = parameter(
+        None,
+        unit="m",
+        minimum=0,
+        maximum=5,
+        doc="how far traced points may lie beside a wall; none: one cell, at least 0.5 m",
+    )
+
+    def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
+        """Return the buildings of a scene; attributes `height` (mean above ground, m) and `tree_likeness` (-1..1)."""
+        return self.work(scene).footprints
+
+    def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
+        """Yield heights, cues, likeness to trees, mask and outlines."""
+        from .ndsm_drawing import draw_steps
+
+        yield from draw_steps(self.work(scene))
+
+    def work(self, scene: Scene) -> Work:
+        """Detect, and return every intermediate result."""
+        scene.require(self.requires)
+        scene = scene.for_detection()
+        assert scene.points is not None
+        # Three points that are there twice lie in one plane like six of a roof.
+        points = scene.points.distinct()
+        heights = heights_above_ground(points, ground_of(scene, use_dem=self.dem))
+        grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
+        cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
+        high = np.nan_to_num(cues.high_share) >= 0.5
+        said = self._said(cues, self._vegetation(scene, grid))
+        likeness = _averaged(_mean_of(said, grid.shape), high, self.smoothing / grid.gsd)
+        roof = high & ((likeness < 0) | np.isnan(likeness))
+        mask = self._clean(roof, grid.gsd)
+        traced = trace(coverage_of_mask(mask, np.where(likeness > 0, np.float32(0), cues.high_share)), grid)
+        return Work(
+            cues=cues,
+            high=high,
+            said=said,
+            likeness=likeness,
+            roof=roof,
+            mask=mask,
+            traced=traced,
+            footprints=self._footprints(traced, cues, likeness, scene.crs),
+        )
+
+    def _vegetation(self, scene: Scene, grid: Grid) -> tuple[_Floats, float] | None:
+        """Return the vegetation index of the image per cell and its threshold."""
+        image = scene.image
+        if image is None:
+            return None
+        threshold = self.ndvi if "nir" in image.bands else self.green_red
+        index = None if threshold is None else greenness(image, grid, darkest=self.darkest)
+        return None if index is None or threshold is None else (index, threshold)
+
+    def _said(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> dict[str, _Floats]:
+        """Return what each cue says of each cell: -1 roof, 0 at its threshold, +1 tree, NaN nothing."""
+        index, least_index = vegetation or (None, None)
+        rules = {
+            "multiple returns": (cues.multiple_share, self.multiple_share, 0.25),
+            "roughness": (cues.roughness, self.roughness, 0.2),
+            "penetration": (cues.penetration, self.penetration, 0.15),
+            _IMAGE: (index, least_index, 0.05),
+        }
+        return {
+            name: np.clip((value - np.float32(threshold)) / np.float32(width), -1, 1)
+            for name, (value, threshold, width) in rules.items()
+            if value is not None and threshold is not None
+        }
+
+    def _clean(self, roof: _Mask, cell: float) -> _Mask:
+        """Fill small holes and open."""
+        return opened(without_holes(roof, self.largest_hole / cell**2), self.opening / cell)
+
+    def _footprints(
+        self, traced: NDArray[np.object_], cues: CellCues, likeness: _Floats, crs: str | None
+    ) -> Footprints:
+        height, looks = _means_inside(traced, cues.grid, cues.height, likeness)
+        if self.outline == "rectangle":
+            polygons = minimum_rectangles(traced)
+        else:
+            tolerance = max(cues.grid.gsd, 0.5) if self.tolerance is None else self.tolerance
+            polygons = regularise(traced, tolerance)
+        # Where no cue says anything the mean is NaN, and the footprint stays.
+        keep = ~(looks > self.most_tree_like) & (shapely.area(polygons) >= self.smallest_area)
+        attributes = {"height": height[keep], "tree_likeness": looks[keep]}
+        return Footprints.of(polygons[keep], crs=crs, attributes=attributes, source=self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """All intermediate results of one detection; rasters of shape (rows, columns).
+
+    Attributes
+    ----------
+    cues : CellCues
+    high : ndarray of bool
+        Cells at least half of whose points are high.
+    said : dict of str to ndarray of float32
+        Per cue: -1 roof, +1 tree, NaN nothing.
+    likeness : ndarray of float32
+        Their mean over the neighbourhood.
+    roof, mask : ndarray of bool
+        High cells that look like a roof, before and after cleaning.
+    traced : ndarray of Polygon
+        Outlines of the mask, all vertices.
+    footprints : Footprints
+    """
+
+    cues: CellCues
+    high: _Mask
+    said: dict[str, _Floats]
+    likeness: _Floats
+    roof: _Mask
+    mask: _Mask
+    traced: NDArray[np.object_]
+    footprints: Footprints
+
+
+def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple[float, float, float, float]) -> float:
+    """Return 1.4 times the point spacing in metres, in steps of 0.05 m, 0.25 to 2 m.
+
+    The spacing is that of the covered part of the extent (2 m cells that hold points).
+    """
+    coarse = Grid.covering(extent, 2.0)
+    index, inside = coarse.cells(points.x, points.y)
+    used = inside & np.isfinite(heights)
+    covered = np.count_nonzero(np.bincount(index[used], minlength=1))
+    if covered == 0:
+        return 1.0
+    spacing = math.sqrt(covered * 4.0 / np.count_nonzero(used))
+    return min(max(round(1.4 * spacing / 0.05) * 0.05, 0.25), 2.0)
+
+
+def _mean_of(said: dict[str, _Floats], shape: tuple[int, int]) -> _Floats:
+    """Return the weighted mean of what the cues say; NaN where none says anything."""
+    total, weights = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
+    for name, cue in said.items():
+        weight = np.float32(_IMAGE_WEIGHT if name == _IMAGE else 1)
+        told = np.isfinite(cue)
+        total += np.where(told, weight * cue, 0)
+        weights += weight * told
+    return np.where(weights > 0, total / np.where(weights > 0, weights, 1), np.float32(np.nan))
+
+
+def _averaged(likeness: _Floats, high: _Mask, sigma: float) -> _Floats:
+    """Return the Gaussian mean over high cells, unchanged in others; `sigma` in cells."""
+    import cv2
+
+    told = high & np.isfinite(likeness)
+    if sigma <= 0 or not told.any():
+        return likeness
+    total = cv2.GaussianBlur(np.where(told, likeness, np.float32(0)), (0, 0), sigma)
+    weight = cv2.GaussianBlur(told.astype(np.float32), (0, 0), sigma)
+    return np.where(told, total / np.where(told, weight, 1), likeness)
+
+
+def _means_inside(polygons: NDArray[np.object_], grid: Grid, *rasters: _Floats) -> list[NDArray[np.float64]]:
+    """Return per raster the mean of its known cells inside each polygon; NaN where none is known."""
+    from rasterio.features import rasterize
+    from rasterio.transform import Affine
+
+    if len(polygons) == 0:
+        return [np.empty(0) for _ in rasters]
+    shapes = ((polygon, number) for number, polygon in enumerate(polygons, start=1))
+    owner = rasterize(shapes, out_shape=grid.shape, transform=Affine(*grid.transform), dtype=np.int32)
+    means = []
+    for raster in rasters:
+        known = np.isfinite(raster) & (owner > 0)
+        count = np.bincount(owner[known], minlength=len(polygons) + 1)[1:]
+        total = np.bincount(owner[known], weights=raster[known], minlength=len(polygons) + 1)[1:]
+        means.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    return means

@@ -1,0 +1,1 @@
+"""What several detectors use: cues, morphology, outlines, regularisation."""

@@ -1,0 +1,253 @@
+"""Cues that tell roofs from trees, per cell of a grid.
+
+Nouns
+-----
+high point
+    A point more than the height threshold above the ground.
+high share
+    High points among all points of a cell: the share of the cell that something high covers, and 1 over a roof. Pulses
+    pass through a crown, so its share is lower: the complement is the *penetration*.
+multiple share
+    High points whose pulse gave several returns, among the high points around: 0 on a roof, 1 in a crown.
+roughness
+    Standard deviation, metres, of the high points of a window about their plane; each cell takes the smoothest of the
+    windows that hold it, so that ridges, eaves and steps between roofs stay smooth.
+greenness
+    (NIR - R) / (NIR + R), or (G - R) / (G + R) without near infrared; NaN in the dark, where colours are noise.
+
+Axis order (row, column), row 0 northernmost. Cells where a cue says nothing are NaN.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ...scenes.geodata.points import PointCloud
+from ...scenes.geodata.raster import Grid, Image
+
+__all__ = ["CellCues", "cell_cues", "greenness"]
+
+_Floats = NDArray[np.float32]
+
+#: A cell without points takes the high share of the cells around when these hold at least so many points.
+_NEIGHBOURS = 3
+#: A plane through fewer points than this fits by chance.
+_LEAST_POINTS = 6
+#: Least ratio of the spread of the points in two directions (determinant over squared mean of their covariance).
+_FLATTEST = 1e-3
+#: Cells of a strip.
+_STRIP = 1_000_000
+#: Where there is no plane: a deviation that is never the least.
+_NO_PLANE = np.float32(1e9)
+
+
+@dataclass(frozen=True, eq=False)
+class CellCues:
+    """Cues of the laser points on a grid; all arrays of shape (rows, columns), float32.
+
+    Attributes
+    ----------
+    grid : Grid
+    count : ndarray
+        Points per cell, high or low.
+    high_share : ndarray
+        Per cell, or over 3 x 3 cells where a cell has no points; NaN where those have none either.
+    penetration : ndarray
+        1 - high share over 3 x 3 cells.
+    multiple_share : ndarray or None
+        Over 3 x 3 cells; None when the points do not tell.
+    roughness : ndarray
+        Metres; NaN where too few points are high.
+    height : ndarray
+        Mean height of the high points, metres; NaN without.
+    """
+
+    grid: Grid
+    count: _Floats
+    high_share: _Floats
+    penetration: _Floats
+    multiple_share: _Floats | None
+    roughness: _Floats
+    height: _Floats
+
+
+def cell_cues(
+    points: PointCloud, heights: NDArray[np.float32], grid: Grid, *, threshold: float, window: float
+) -> CellCues:
+    """Gather the cues of points on a grid.
+
+    Parameters
+    ----------
+    points : PointCloud
+    heights : ndarray of float32, shape (n,)
+        Metres above ground; NaN leaves a point out.
+    grid : Grid
+    threshold : float
+        Height in metres above which a point is high.
+    window : float
+        Width in metres of the windows in which planes are fitted; at least two cells.
+    """
+    index, inside = grid.cells(points.x, points.y)
+    used = np.flatnonzero(inside & np.isfinite(heights))
+    size = grid.rows * grid.columns
+    high = used[heights[used] > threshold]
+    count = _on_grid(np.bincount(index[used], minlength=size), grid)
+    n_high = _on_grid(np.bincount(index[high], minlength=size), grid)
+    sums = np.bincount(index[high], weights=heights[high], minlength=size)
+
+    multiple_share = None
+    returns = points.number_of_returns
+    if returns is not None and (returns[used] > 1).any():
+        multiple = _on_grid(np.bincount(index[high[returns[high] > 1]], minlength=size), grid)
+        multiple_share = _share(_box(multiple), _box(n_high))
+    smoothest = _smoothest_plane(points, index, high, grid, max(2, round(window / grid.gsd)))
+    shared = _share(_box(n_high), _box(count))
+    return CellCues(
+        grid=grid,
+        count=count,
+        high_share=np.where((count > 0) | (_box(count) < _NEIGHBOURS), _share(n_high, count), shared),
+        penetration=1 - shared,
+        multiple_share=multiple_share,
+        roughness=np.where((smoothest < _NO_PLANE) & (n_high > 0), smoothest, np.float32(np.nan)),
+        height=_share(_on_grid(sums, grid), n_high),
+    )
+
+
+def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
+    """Return the mean vegetation index of the image per cell of a grid; None when the image has no colours for it.
+
+    Parameters
+    ----------
+    image : Image
+    grid : Grid
+    darkest : float
+        Pixels whose brightest band is below this (0..1) say nothing.
+    """
+    import cv2
+
+    if {"nir", "red"} <= set(image.bands):
+        more, less = image.band("nir"), image.band("red")
+    elif {"green", "red"} <= set(image.bands):
+        more, less = image.band("green"), image.band("red")
+    else:
+        return None
+    bright = np.maximum(more, less)
+    if not bright.any():
+        return None
+    told = (bright >= darkest) if image.valid is None else (bright >= darkest) & image.valid
+    index = np.where(told, (more - less) / np.maximum(more + less, np.float32(1e-6)), np.float32(0))
+    # Blurred to the cell size before it is sampled at the cell centres: a mean over about one cell, also for cells
+    # smaller than a pixel.
+    width = max(1, round(grid.gsd / image.grid.gsd))
+    weight = cv2.blur(told.astype(np.float32), (width, width), borderType=cv2.BORDER_CONSTANT)
+    total = cv2.blur(index, (width, width), borderType=cv2.BORDER_CONSTANT)
+    x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)
+    _, y = grid.to_world(np.arange(grid.rows) + 0.5, 0)
+    _, column = image.grid.to_pixel(x, image.grid.north)
+    row, _ = image.grid.to_pixel(image.grid.west, y)
+    map_x, map_y = np.meshgrid((column - 0.5).astype(np.float32), (row - 0.5).astype(np.float32))
+    options = {"interpolation": cv2.INTER_LINEAR, "borderMode": cv2.BORDER_CONSTANT, "borderValue": 0}
+    weight = cv2.remap(weight, map_x, map_y, **options)
+    total = cv2.remap(total, map_x, map_y, **options)
+    return np.where(weight > 0.25, total / np.maximum(weight, np.float32(0.25)), np.float32(np.nan))
+
+
+def _on_grid(values: NDArray[np.generic], grid: Grid) -> _Floats:
+    return values.astype(np.float32).reshape(grid.shape)
+
+
+def _box(values: _Floats) -> _Floats:
+    """Sum over 3 x 3 cells."""
+    import cv2
+
+    total: _Floats = cv2.boxFilter(values, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return total
+
+
+def _share(part: _Floats, whole: _Floats) -> _Floats:
+    return np.where(whole > 0, part / np.maximum(whole, np.float32(1)), np.float32(np.nan))
+
+
+@njit(cache=True)
+def _moments(x, y, z, index, chosen, middle, base, shape):  # type: ignore[no-untyped-def]
+    """Return n, x, y, z, xx, xy, yy, xz, yz, zz of the chosen points in their cells `index`, from a middle and base."""
+    sums = np.zeros((10, shape[0] * shape[1]))
+    for position in range(len(chosen)):
+        i, cell = chosen[position], index[position]
+        dx, dy, dz = x[i] - middle[0], y[i] - middle[1], z[i] - base
+        sums[0, cell] += 1
+        sums[1, cell] += dx
+        sums[2, cell] += dy
+        sums[3, cell] += dz
+        sums[4, cell] += dx * dx
+        sums[5, cell] += dx * dy
+        sums[6, cell] += dy * dy
+        sums[7, cell] += dx * dz
+        sums[8, cell] += dy * dz
+        sums[9, cell] += dz * dz
+    return sums.reshape((10, shape[0], shape[1]))
+
+
+def _smoothest_plane(
+    points: PointCloud, index: NDArray[np.intp], chosen: NDArray[np.intp], grid: Grid, width: int
+) -> _Floats:
+    """Return the least deviation from a plane among the windows of width x width cells that hold a cell.
+
+    The grid is worked through in strips of rows: ten moments per cell are much more than the points themselves.
+    """
+    import cv2
+
+    before = (width - 1) // 2
+    after = width - 1 - before
+    window = np.ones((width, width), np.uint8)
+    smoothest = np.empty(grid.shape, dtype=np.float32)
+    middle = np.array(grid.to_world(grid.rows / 2, grid.columns / 2))
+    base = float(points.z[chosen].mean()) if len(chosen) else 0.0
+    row = index[chosen] // grid.columns
+    strip = max(4 * width, _STRIP // grid.columns)
+    for top in range(0, grid.rows, strip):
+        # A cell's windows reach width - 1 rows beyond it.
+        first, last = max(top - width + 1, 0), min(top + strip + width - 1, grid.rows)
+        here = chosen[(row >= first) & (row < last)]
+        shape = (last - first, grid.columns)
+        moments = _moments(points.x, points.y, points.z, index[here] - first * grid.columns, here, middle, base, shape)
+        for moment in moments:
+            cv2.boxFilter(
+                moment, -1, (width, width), moment, (before, before), normalize=False, borderType=cv2.BORDER_CONSTANT
+            )
+        least = cv2.erode(_plane_deviation(moments), window, anchor=(after, after))
+        smoothest[top : top + strip] = least[top - first : top - first + strip]
+    return smoothest
+
+
+@njit(cache=True)
+def _plane_deviation(moments):  # type: ignore[no-untyped-def]
+    """Return the standard deviation about the least-squares plane, `_NO_PLANE` where the points determine none."""
+    _, rows, columns = moments.shape
+    deviation = np.full((rows, columns), _NO_PLANE, dtype=np.float32)
+    for row in range(rows):
+        for column in range(columns):
+            n = round(moments[0, row, column])
+            if n < _LEAST_POINTS:
+                continue
+            mx, my, mz = moments[1, row, column] / n, moments[2, row, column] / n, moments[3, row, column] / n
+            xx = moments[4, row, column] / n - mx * mx
+            xy = moments[5, row, column] / n - mx * my
+            yy = moments[6, row, column] / n - my * my
+            xz = moments[7, row, column] / n - mx * mz
+            yz = moments[8, row, column] / n - my * mz
+            zz = moments[9, row, column] / n - mz * mz
+            determinant = xx * yy - xy * xy
+            # Points on one scan line, or on top of each other, determine no plane.
+            if determinant < max(_FLATTEST * (0.5 * (xx + yy)) ** 2, 1e-8):
+                continue
+            a = (xz * yy - yz * xy) / determinant
+            b = (yz * xx - xz * xy) / determinant
+            # Raised by its own standard error: the least of several windows must not be one of few points by luck.
+            sigma = np.sqrt(max(zz - a * xz - b * yz, 0.0) * n / (n - 3))
+            deviation[row, column] = sigma * (1 + 1 / np.sqrt(2.0 * (n - 3)))
+    return deviation

@@ -1,0 +1,1 @@
+"""Overlay: what every evaluator stands on. Overlaps, areas, pixels, distances between outlines."""

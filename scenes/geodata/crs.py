@@ -1,0 +1,170 @@
+"""Coordinate reference systems (CRS): read, compare, and require metres.
+
+A CRS is kept as the text that a file or a person gives: ``"EPSG:28992"`` or WKT. Areas and distances are in the unit
+of its axes, so evaluation and detection accept only projected systems in metres.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from ...core.errors import CRSError
+
+if TYPE_CHECKING:
+    from pyproj import CRS
+
+__all__ = [
+    "common_crs",
+    "crs_label",
+    "crs_text",
+    "named_crs",
+    "parse_crs",
+    "require_metric",
+    "same_crs",
+    "scale_warning",
+]
+
+#: Largest deviation of mapped from true areas that passes without a warning; national grids stay below a tenth of it.
+_AREA_TOLERANCE = 0.02
+
+
+@lru_cache(maxsize=64)
+def parse_crs(text: str) -> CRS:
+    """Return the `pyproj.CRS` of an authority code, WKT or PROJ string."""
+    import pyproj
+    from pyproj.exceptions import CRSError as ProjError
+
+    try:
+        return pyproj.CRS.from_user_input(text)
+    except ProjError as error:
+        raise CRSError(f"{text[:60]!r} is no coordinate reference system: write for instance EPSG:25832") from error
+
+
+def named_crs(text: str) -> str:
+    """Return what a person wrote as a CRS in the form that files keep: ``2154`` and ``epsg:2154`` as ``EPSG:2154``."""
+    return crs_text(parse_crs(text.strip()))
+
+
+@lru_cache(maxsize=64)
+def crs_label(text: str | None) -> str:
+    """Return a short name for people: ``EPSG:28992`` where the authority is known, else the name in the WKT."""
+    if text is None:
+        return "no CRS"
+    if text.upper().startswith("EPSG:"):
+        return text.upper()
+    crs = parse_crs(text)
+    authority = crs.to_authority(min_confidence=60)
+    return ":".join(authority) if authority else str(crs.name)
+
+
+def crs_text(crs: CRS) -> str:
+    """Return the text by which roofbench keeps the horizontal part: ``EPSG:28992`` where there is a code, else WKT."""
+    horizontal = _horizontal(crs.to_wkt())
+    authority = horizontal.to_authority(min_confidence=100)
+    return ":".join(authority) if authority else str(horizontal.to_wkt())
+
+
+@lru_cache(maxsize=64)
+def _horizontal(text: str) -> CRS:
+    """Return the horizontal part of a compound CRS, else the CRS itself."""
+    crs = parse_crs(text)
+    while crs.is_compound or crs.is_bound:
+        crs = crs.sub_crs_list[0] if crs.is_compound else crs.source_crs
+    return crs
+
+
+#: How files of other kinds than points get another CRS.
+_REPROJECT = "reproject it, for instance with ogr2ogr -t_srs or gdalwarp -t_srs"
+
+
+def require_metric(text: str | None, where: str, *, heights: bool = True, remedy: str | None = None) -> None:
+    """Raise `CRSError` unless the CRS is projected, with axes (and heights, if it names them) in metres.
+
+    None (not known) passes.
+
+    Parameters
+    ----------
+    text : str, optional
+        CRS as text.
+    where : str
+        File or argument that it belongs to, for the message.
+    heights : bool
+        Whether heights matter; for footprints they do not.
+    remedy : str, optional
+        What to do, for the message; by default to reproject rasters and vector files or to name the true CRS.
+    """
+    if text is None:
+        return
+    crs = _horizontal(text)
+    if crs.is_geographic:
+        raise CRSError(
+            f"{where}: {crs_label(text)} is geographic (degrees), areas and distances need metres: "
+            f"{remedy or _REPROJECT + ', or name its true CRS with --crs'}"
+        )
+    unit = crs.axis_info[0] if crs.axis_info else None
+    if unit is not None and abs(unit.unit_conversion_factor - 1.0) > 1e-9:
+        raise CRSError(f"{where}: {crs_label(text)} is in {unit.unit_name}, metres are needed: {remedy or _REPROJECT}")
+    if not heights:
+        return
+    whole = parse_crs(text)
+    for part in whole.sub_crs_list if whole.is_compound else [whole]:
+        for axis in part.axis_info:
+            if axis.direction in ("up", "down") and abs(axis.unit_conversion_factor - 1.0) > 1e-9:
+                raise CRSError(
+                    f"{where}: its heights are in {axis.unit_name} ({part.name}), metres are needed: "
+                    f"{remedy or 'convert them'}"
+                )
+
+
+def scale_warning(text: str | None, x: float, y: float) -> str | None:
+    """Return in words that areas at a place are far from true ones, as in Web Mercator; None where they are not."""
+    if text is None:
+        return None
+    import pyproj
+    from pyproj.exceptions import ProjError
+
+    projection = pyproj.Proj(_horizontal(text))
+    try:
+        scale = projection.get_factors(*projection(x, y, inverse=True)).areal_scale
+    except ProjError:
+        return None  # outside the domain of the projection
+    if not math.isfinite(scale) or abs(scale - 1.0) <= _AREA_TOLERANCE:
+        return None
+    return (
+        f"warning: {crs_label(text)} shows areas {scale:.2f} and lengths {scale**0.5:.2f} times as large as they are "
+        "here: reproject to the national grid or a UTM zone"
+    )
+
+
+def same_crs(first: str, second: str) -> bool:
+    """Return whether two CRS texts mean the same horizontal system."""
+    if first == second:
+        return True
+    one, two = _horizontal(first), _horizontal(second)
+    if one.equals(two, ignore_axis_order=True):
+        return True
+    code = one.to_authority(min_confidence=60)
+    return code is not None and code == two.to_authority(min_confidence=60)
+
+
+def common_crs(first: str | None, second: str | None, names: tuple[str, str]) -> str | None:
+    """Return the CRS that two inputs share, or raise `CRSError`.
+
+    Both unknown is accepted (coordinates are taken as metres); only one unknown is not, since a guess would be silent.
+    """
+    if first is None and second is None:
+        return None
+    if first is None or second is None:
+        lacking, other = (names[0], second) if first is None else (names[1], first)
+        raise CRSError(
+            f"{lacking} has no coordinate reference system while the other is in {crs_label(other)}: "
+            "name it with --crs (in Python: crs=)"
+        )
+    if not same_crs(first, second):
+        raise CRSError(
+            f"{names[0]} is in {crs_label(first)} but {names[1]} in {crs_label(second)}: "
+            "reproject one of them, for instance with ogr2ogr -t_srs"
+        )
+    return first

@@ -1,0 +1,328 @@
+"""Footprints: the outlines of buildings seen from above, detected or of reference.
+
+Nouns
+-----
+footprint (entity)
+    One polygon or multipolygon, with or without holes, in metres of a projected CRS, axis order x (east), y (north).
+building id
+    Label shared by the footprints that are parts of one building (L, T, U, C shapes).
+centre
+    Of a convex quadrilateral without holes: the intersection of its diagonals; of anything else: the area centroid.
+repair
+    What was changed or dropped to make a footprint usable; nothing is changed silently.
+
+Source of the definitions: Awrangjeb, Ravanbakhsh & Fraser (2010), section 4.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.errors import InputError
+from .vector_columns import labels_of
+
+__all__ = ["Footprints", "Repair", "polygonal_part"]
+
+#: Widest gap that is closed between footprints, metres: no two houses so far apart are one block.
+_WIDEST_GAP = 100.0
+
+#: Stands for "number the rows from 0".
+_UNNUMBERED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Repair:
+    """One footprint that was mended or left out on the way in.
+
+    Attributes
+    ----------
+    id : int
+        Row of the footprint in its source, from 0.
+    problem : str
+        What was wrong: ``"Self-intersection at (3, 4)"``, ``"empty"``, ``"zero area"``, ``"not a polygon: Point"``.
+    action : str
+        ``"mended"`` or ``"left out"``.
+    """
+
+    id: int
+    problem: str
+    action: str
+
+    def __str__(self) -> str:
+        return f"feature {self.id}: {self.problem}: {self.action}"
+
+
+@dataclass(frozen=True, eq=False)
+class Footprints:
+    """A set of footprints with a common CRS.
+
+    Build it by `Footprints.of`, which mends and checks; the constructor takes what is already clean.
+
+    Attributes
+    ----------
+    polygons : ndarray of shapely geometries, shape (n,)
+        Valid, non-empty Polygons and MultiPolygons in metres.
+    building_ids : ndarray, shape (n,), optional
+        Integers or texts; None when every polygon is its own building.
+    crs : str, optional
+        Authority code or WKT; None when not known.
+    ids : ndarray of int64, shape (n,)
+        Row of each polygon in its source, to name it in messages and verdicts.
+    attributes : mapping of str to ndarray, shape (n,)
+        Further columns, for instance a detector's score or roof height.
+    metadata : mapping
+        Facts of the whole set that JSON can hold, for instance a sampler's energy trace.
+    repairs : tuple of Repair
+        What was mended or left out on the way in.
+    source : str
+        File or maker, for messages.
+    """
+
+    polygons: NDArray[np.object_]
+    building_ids: NDArray[Any] | None = None
+    crs: str | None = None
+    ids: NDArray[np.int64] = field(default_factory=lambda: _UNNUMBERED)
+    attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+    repairs: tuple[Repair, ...] = ()
+    source: str = "footprints"
+
+    def __post_init__(self) -> None:
+        if self.ids is _UNNUMBERED:
+            object.__setattr__(self, "ids", np.arange(len(self.polygons), dtype=np.int64))
+
+    @classmethod
+    def of(
+        cls,
+        polygons: Iterable[Any],
+        *,
+        building_ids: ArrayLike | None = None,
+        crs: str | None = None,
+        attributes: Mapping[str, ArrayLike] | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        source: str = "footprints",
+    ) -> Footprints:
+        """Build from any geometries: mends invalid ones, leaves out unusable ones, and reports both.
+
+        Building ids may be numbers or texts; a polygon without one (None, NaN) is its own building.
+
+        Invalid geometry is replaced by the polygonal part of its `make_valid`, overlapping parts joined. None, empty,
+        zero-area, non-finite and non-polygonal geometries are left out. Z and M are dropped; a multipolygon of one
+        part becomes a polygon.
+
+        Examples
+        --------
+        >>> bow_tie = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
+        >>> footprints = Footprints.of([bow_tie, shapely.Polygon(), shapely.box(0, 0, 1, 1)])
+        >>> len(footprints), [str(repair) for repair in footprints.repairs]
+        (2, ['feature 0: Self-intersection[1 1]: mended', 'feature 1: empty: left out'])
+        """
+        geometries = _as_geometry_array(polygons)
+        clean, repairs, kept = _mend(geometries)
+        columns = {}
+        for name, column in (attributes or {}).items():
+            values = column if isinstance(column, np.ndarray) else np.asarray(column)  # keeps the mask of a masked one
+            if len(values) != len(geometries):
+                raise InputError(
+                    f"{source}: attribute {name!r} has {len(values)} values for {len(geometries)} polygons"
+                )
+            columns[name] = values[kept]
+        labels = None
+        if building_ids is not None:
+            given = building_ids if isinstance(building_ids, np.ndarray) else _as_column(building_ids)
+            if given.shape != geometries.shape:
+                raise InputError(f"{source}: {given.size} building ids for {len(geometries)} polygons: give one each")
+            labels = labels_of(given)[kept]
+        return cls(
+            polygons=clean,
+            building_ids=labels,
+            crs=crs,
+            ids=np.flatnonzero(kept).astype(np.int64),
+            attributes=columns,
+            metadata=dict(metadata or {}),
+            repairs=repairs,
+            source=source,
+        )
+
+    @classmethod
+    def from_rectangles(
+        cls, corners: ArrayLike, *, crs: str | None = None, building_ids: ArrayLike | None = None, **more: Any
+    ) -> Footprints:
+        """Build from an array of four corners each, shape (n, 4, 2), in metres, in ring order."""
+        array = np.asarray(corners, dtype=np.float64).reshape(-1, 4, 2)
+        polygons = shapely.polygons(np.concatenate([array, array[:, :1]], axis=1))
+        return cls.of(polygons, crs=crs, building_ids=building_ids, **more)
+
+    @classmethod
+    def empty(cls, *, crs: str | None = None, source: str = "footprints") -> Footprints:
+        """Return a set of no footprints: a valid result."""
+        return cls(polygons=np.empty(0, dtype=object), crs=crs, source=source)
+
+    def __len__(self) -> int:
+        return len(self.polygons)
+
+    def __repr__(self) -> str:
+        return f"<Footprints {len(self)} polygons, {self.crs or 'no CRS'}, {self.source}>"
+
+    def take(self, index: NDArray[Any]) -> Footprints:
+        """Return the footprints at `index` (integers or a mask)."""
+        return Footprints(
+            polygons=self.polygons[index],
+            building_ids=None if self.building_ids is None else self.building_ids[index],
+            crs=self.crs,
+            ids=self.ids[index],
+            attributes={name: column[index] for name, column in self.attributes.items()},
+            metadata=self.metadata,
+            repairs=self.repairs,
+            source=self.source,
+        )
+
+    def joined(self, gap: float) -> Footprints:
+        """Return blocks: footprints that are closer than `gap` (m) are joined into one, building ids are dropped.
+
+        A register cuts rows into houses; joined over party walls, its blocks can be compared with detections that
+        cannot see those. Outlines stay where they are but for gaps and notches narrower than `gap`.
+
+        Examples
+        --------
+        >>> row = Footprints.of([shapely.box(0, 0, 5, 9), shapely.box(5.02, 0, 10, 9), shapely.box(20, 0, 25, 9)])
+        >>> [round(area, 1) for area in row.joined(0.1).areas]
+        [90.0, 45.0]
+        """
+        if not 0 < gap <= _WIDEST_GAP:
+            raise InputError(
+                f"{self.source}: footprints are joined over gaps of more than 0 and up to {_WIDEST_GAP:g} m, "
+                f"not {gap:g} m"
+            )
+        grown = shapely.union_all(shapely.buffer(self.polygons, gap / 2, join_style="mitre"))
+        blocks = shapely.get_parts(shapely.buffer(grown, -gap / 2, join_style="mitre"))
+        return Footprints.of(blocks, crs=self.crs, source=f"{self.source} (joined over gaps below {gap:g} m)")
+
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """Area of each footprint, m2, shape (n,)."""
+        return np.asarray(shapely.area(self.polygons), dtype=np.float64)
+
+    @cached_property
+    def building_codes(self) -> NDArray[np.int64]:
+        """Building of each footprint as integers from 0, shape (n,)."""
+        if self.building_ids is None:
+            return np.arange(len(self), dtype=np.int64)
+        return np.unique(self.building_ids, return_inverse=True)[1].astype(np.int64)
+
+    @cached_property
+    def quadrilaterals(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Indices (m,) and corners (m, 4, 2), counter-clockwise, of the convex quadrilaterals without holes."""
+        candidates = np.flatnonzero(
+            (shapely.get_type_id(self.polygons) == 3)
+            & (shapely.get_num_coordinates(self.polygons) == 5)
+            & (shapely.get_num_interior_rings(self.polygons) == 0)
+        )
+        corners = shapely.get_coordinates(self.polygons[candidates]).reshape(-1, 5, 2)[:, :4]
+        edges = np.roll(corners, -1, axis=1) - corners
+        following = np.roll(edges, -1, axis=1)
+        turns = edges[..., 0] * following[..., 1] - edges[..., 1] * following[..., 0]
+        left, right = (turns > 0).all(axis=1), (turns < 0).all(axis=1)
+        corners = np.where(right[:, None, None], corners[:, ::-1], corners)
+        convex = left | right
+        return candidates[convex], np.ascontiguousarray(corners[convex])
+
+    @cached_property
+    def centres(self) -> NDArray[np.float64]:
+        """Centre of each footprint, shape (n, 2), metres (2010 paper, section 4.1)."""
+        centres = np.empty((len(self), 2))
+        index, corners = self.quadrilaterals
+        others = np.ones(len(self), dtype=bool)
+        others[index] = False
+        centres[others] = shapely.get_coordinates(shapely.centroid(self.polygons[others]))
+        if len(index):
+            first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+            offset = corners[:, 1] - corners[:, 0]
+            along = offset[:, 0] * second[:, 1] - offset[:, 1] * second[:, 0]
+            along /= first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+            centres[index] = corners[:, 0] + along[:, None] * first
+        return centres
+
+
+def _as_geometry_array(polygons: Iterable[Any]) -> NDArray[np.object_]:
+    if isinstance(polygons, shapely.Geometry) or (isinstance(polygons, np.ndarray) and polygons.ndim != 1):
+        raise InputError("footprints are built from a sequence of polygons, one dimension: put a single one in a list")
+    items = polygons if isinstance(polygons, np.ndarray) else list(polygons)
+    array = np.empty(len(items), dtype=object)
+    array[:] = items
+    if not (shapely.is_geometry(array) | shapely.is_missing(array)).all():
+        wrong = next(item for item in array if item is not None and not shapely.is_geometry(item))
+        raise InputError(f"footprints are shapely polygons, not {type(wrong).__name__}")
+    return array
+
+
+def _as_column(values: Any) -> NDArray[Any]:
+    """Return a list as an array that keeps texts and numbers apart."""
+    items = list(values)
+    plain = all(isinstance(item, str) for item in items) or all(isinstance(item, int | np.integer) for item in items)
+    return np.array(items) if plain and items else np.array(items, dtype=object)
+
+
+def _mend(
+    geometries: NDArray[np.object_],
+) -> tuple[NDArray[np.object_], tuple[Repair, ...], NDArray[np.bool_]]:
+    """Return clean polygons, the repairs, and the mask of rows that were kept."""
+    geometries = shapely.force_2d(geometries)
+    repairs: list[Repair] = []
+    kept = np.ones(len(geometries), dtype=bool)
+
+    def leave_out(rows: NDArray[np.bool_], problem: str) -> None:
+        for row in np.flatnonzero(rows & kept):
+            repairs.append(Repair(int(row), problem, "left out"))
+        kept[rows] = False
+
+    leave_out(shapely.is_missing(geometries), "no geometry")
+    leave_out(shapely.is_empty(geometries), "empty")
+    polygonal = np.isin(shapely.get_type_id(geometries), (3, 6, 7))
+    for row in np.flatnonzero(kept & ~polygonal):
+        repairs.append(Repair(int(row), f"not a polygon: {geometries[row].geom_type}", "left out"))
+    kept &= polygonal
+    finite = np.isfinite(shapely.bounds(geometries)).all(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        finite[kept] &= np.isfinite(shapely.area(geometries[kept]))
+    leave_out(~finite, "coordinates that are not finite")
+
+    suspect = np.flatnonzero(kept)[~shapely.is_valid(geometries[kept])]
+    suspect = np.union1d(suspect, np.flatnonzero(kept & (shapely.get_type_id(geometries) == 7)))
+    for row in suspect:
+        collection = geometries[row].geom_type == "GeometryCollection"
+        problem = "a collection of geometries" if collection else shapely.is_valid_reason(geometries[row])
+        # "structure" joins overlapping parts; "linework" would make holes where they overlap.
+        mended = shapely.make_valid(geometries[row], method="structure", keep_collapsed=False)
+        geometries[row] = polygonal_part(mended)
+        usable = not geometries[row].is_empty
+        repairs.append(Repair(int(row), problem, "mended" if usable else "left out"))
+        kept[row] = usable
+    single = kept & (shapely.get_type_id(geometries) == 6) & (shapely.get_num_geometries(geometries) == 1)
+    geometries[single] = shapely.get_geometry(geometries[single], 0)
+    flat = np.zeros(len(geometries), dtype=bool)
+    flat[kept] = ~(shapely.area(geometries[kept]) > 0)
+    leave_out(flat, "zero area")
+    repairs.sort(key=lambda repair: repair.id)
+    return geometries[kept], tuple(repairs), kept
+
+
+def polygonal_part(geometry: shapely.Geometry) -> shapely.Geometry:
+    """Return what has area in a geometry; an empty multipolygon where nothing has.
+
+    Examples
+    --------
+    >>> mixed = shapely.GeometryCollection([shapely.box(0, 0, 1, 1), shapely.LineString([(1, 1), (2, 2)])])
+    >>> polygonal_part(mixed).geom_type, polygonal_part(shapely.Point(0, 0)).wkt
+    ('Polygon', 'MULTIPOLYGON EMPTY')
+    """
+    parts = shapely.get_parts(shapely.get_parts(geometry))
+    polygons = parts[shapely.get_type_id(parts) == 3]
+    return shapely.union_all(polygons) if len(polygons) else shapely.MultiPolygon()

@@ -1,0 +1,157 @@
+"""Rasters: orthoimages and elevation models on a north-up grid of square cells.
+
+Nouns
+-----
+grid
+    Upper left corner (`west`, `north`), cell size `gsd` (ground sampling distance, metres), `rows` and `columns`.
+    Row 0 is the northernmost; the centre of cell (row, column) is at
+    ``west + (column + 0.5) * gsd, north - (row + 0.5) * gsd``.
+raster
+    Values on a grid, axis order (band, row, column) for images and (row, column) for elevation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.errors import InputError
+
+__all__ = ["Elevation", "Grid", "Image"]
+
+#: Rows of points put on a grid at a time.
+_CHUNK = 1_000_000
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A north-up grid of square cells; all lengths in metres."""
+
+    west: float
+    north: float
+    gsd: float
+    rows: int
+    columns: int
+
+    @classmethod
+    def covering(cls, extent: Sequence[float], gsd: float) -> Grid:
+        """Return the smallest grid, anchored at multiples of `gsd`, that covers ``[xmin, ymin, xmax, ymax]``."""
+        xmin, ymin, xmax, ymax = extent
+        west, north = math.floor(xmin / gsd + 1e-9) * gsd, math.ceil(ymax / gsd - 1e-9) * gsd
+        columns = max(1, math.ceil((xmax - west) / gsd - 1e-9))
+        rows = max(1, math.ceil((north - ymin) / gsd - 1e-9))
+        return cls(west, north, gsd, rows, columns)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.rows, self.columns
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """``(xmin, ymin, xmax, ymax)`` of the outer cell edges."""
+        south, east = self.north - self.rows * self.gsd, self.west + self.columns * self.gsd
+        return self.west, south, east, self.north
+
+    @property
+    def transform(self) -> tuple[float, float, float, float, float, float]:
+        """Affine coefficients ``(a, b, c, d, e, f)`` as rasterio writes them."""
+        return self.gsd, 0.0, self.west, 0.0, -self.gsd, self.north
+
+    def to_pixel(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return fractional (row, column); the centre of the first cell is (0.5, 0.5), so ``floor`` gives its index."""
+        row = (self.north - np.asarray(y, dtype=np.float64)) / self.gsd
+        column = (np.asarray(x, dtype=np.float64) - self.west) / self.gsd
+        return row, column
+
+    def to_world(self, row: ArrayLike, column: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return (x, y) of fractional (row, column), the inverse of `to_pixel`."""
+        x = self.west + np.asarray(column, dtype=np.float64) * self.gsd
+        y = self.north - np.asarray(row, dtype=np.float64) * self.gsd
+        return x, y
+
+    def cells(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Return the flat cell index of each point and whether it lies on the grid (index 0 where it does not)."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        flat, inside = np.empty(x.shape, dtype=np.intp), np.empty(x.shape, dtype=bool)
+        # In parts, so that many points do not need several arrays of their size at once.
+        for start in range(0, len(x) if x.ndim else 0, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            flat[part], inside[part] = self._cells(x[part], y[part])
+        return (flat, inside) if x.ndim else self._cells(x, y)
+
+    def _cells(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        row, column = self.to_pixel(x, y)
+        inside = (row >= 0) & (row < self.rows) & (column >= 0) & (column < self.columns)
+        flat = np.where(inside, np.floor(row) * self.columns + np.floor(column), 0)
+        return flat.astype(np.intp), inside
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """An orthoimage.
+
+    Attributes
+    ----------
+    values : ndarray, shape (bands, rows, columns)
+        uint8 or uint16.
+    bands : tuple of str
+        ``red``, ``green``, ``blue``, ``nir`` or ``grey``, in the order of `values`.
+    grid : Grid
+    valid : ndarray of bool, shape (rows, columns), optional
+        False where the image has no data; None when it has data everywhere.
+    """
+
+    values: NDArray[np.uint8] | NDArray[np.uint16]
+    bands: tuple[str, ...]
+    grid: Grid
+    valid: NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        if self.values.shape != (len(self.bands), *self.grid.shape):
+            raise InputError(
+                f"image values have shape {self.values.shape}, but {len(self.bands)} bands on a grid of "
+                f"{self.grid.rows} x {self.grid.columns} need {(len(self.bands), *self.grid.shape)}"
+            )
+
+    def band(self, name: str) -> NDArray[np.float32]:
+        """Return one band scaled to 0..1, shape (rows, columns)."""
+        if name not in self.bands:
+            raise InputError(f"the image has no band {name!r}; it has {', '.join(self.bands)}")
+        values = self.values[self.bands.index(name)]
+        scaled: NDArray[np.float32] = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
+        return scaled
+
+    @property
+    def is_colour(self) -> bool:
+        """Whether red, green and blue are all there."""
+        return {"red", "green", "blue"} <= set(self.bands)
+
+
+@dataclass(frozen=True, eq=False)
+class Elevation:
+    """An elevation model (DEM: bare earth; DSM: highest surface; nDSM: height above ground).
+
+    Attributes
+    ----------
+    values : ndarray of float32, shape (rows, columns)
+        Metres; NaN where not known.
+    grid : Grid
+    """
+
+    values: NDArray[np.float32]
+    grid: Grid
+
+    def sample(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+        """Return bilinear elevation at points, shape of `x`; clamped at the border, NaN beside unknown cells."""
+        # numba takes a while to load, and evaluating footprints does not sample.
+        from .sampling import bilinear
+
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        grid = self.grid
+        sampled: NDArray[np.float64] = bilinear(self.values, grid.west, grid.north, grid.gsd, x.ravel(), y.ravel())
+        return sampled.reshape(x.shape)

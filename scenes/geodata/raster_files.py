@@ -1,0 +1,363 @@
+"""GeoTIFF files: orthoimages and elevation models read and written, and what is wrong with those of others.
+
+Nouns
+-----
+north up
+    The affine transform has no rotation and rows run southwards; that is what `Grid` can hold.
+header
+    What a file says of itself, checked before anything is read.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import CRSError, InputError
+from .crs import crs_text
+from .raster import Elevation, Grid, Image
+
+__all__ = [
+    "BANDS",
+    "RasterHeader",
+    "band_names",
+    "is_opaque",
+    "looks_like_values",
+    "opened",
+    "read_elevation",
+    "read_image",
+    "read_raster_header",
+    "require_image_type",
+    "write_elevation",
+    "write_image",
+]
+
+#: Names that a band can have; any other in ``--bands`` is refused, ``-`` skips one.
+BANDS = ("red", "green", "blue", "nir", "grey")
+_DEFAULT_BANDS = {1: ("grey",), 3: ("red", "green", "blue"), 4: ("red", "green", "blue", "nir")}
+
+
+@dataclass(frozen=True)
+class RasterHeader:
+    """What a raster file says of itself.
+
+    Attributes
+    ----------
+    path : Path
+    crs : str, optional
+        Horizontal CRS; None when the file has none.
+    grid : Grid
+        Its own grid; for cells that are not square, the one of the smaller side.
+    band_count : int
+        Without an alpha band.
+    band_names : tuple of str
+        Descriptions of the bands; empty texts where there are none.
+    dtype : str
+        ``"uint8"``.
+    square : bool
+        Whether the cells are square.
+    height_unit : str, optional
+        Unit of the values of an elevation model where the file tells another one than metres.
+    scale, offset : float
+        From the values in the file to heights: ``value * scale + offset``; mostly 1 and 0.
+    alpha : bool
+        Whether a further, last band is marked as alpha. Many programs mark near infrared so.
+    """
+
+    path: Path
+    crs: str | None
+    grid: Grid
+    band_count: int
+    band_names: tuple[str, ...]
+    dtype: str
+    square: bool
+    height_unit: str | None
+    scale: float
+    offset: float
+    alpha: bool = False
+
+
+def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) -> RasterHeader:
+    """Read what a raster file says of itself and check its georeference.
+
+    Parameters
+    ----------
+    path : path
+    crs : str, optional
+        CRS that replaces the file's own (which is then not checked).
+
+    Raises
+    ------
+    InputError
+        Missing, not a raster, no georeference, rotated or upside down.
+    CRSError
+        Units other than metres. A geographic CRS passes when it can be warped, which is for the caller to say.
+    """
+    file = Path(path)
+    with opened(file) as source:
+        if source.transform.is_identity and not source.crs:
+            raise InputError(
+                f"{file} has no georeference: expected a GeoTIFF with an affine transform and a CRS; "
+                "set them with gdal_edit.py -a_srs -a_ullr, or put its world file (.tfw) beside it"
+            )
+        if source.transform.is_identity:
+            raise InputError(
+                f"{file} has a CRS but no affine transform: set its corners with gdal_edit.py -a_ullr or put its "
+                "world file (.tfw) beside it"
+            )
+        a, b, c, d, e, f = tuple(source.transform)[:6]
+        if abs(b) > 1e-9 * abs(a) or abs(d) > 1e-9 * abs(e) or a <= 0 or e >= 0:
+            raise InputError(
+                f"{file} is rotated or not north up (affine transform {a:g}, {b:g}, {d:g}, {e:g}): make it north up, "
+                "for instance with gdalwarp"
+            )
+        own = crs
+        if own is None and source.crs:
+            own = _source_crs(file, source)
+        side = min(a, -e)
+        grid = Grid(c, f, side, max(1, round(source.height * -e / side)), max(1, round(source.width * a / side)))
+        colours = source.colorinterp
+        if colours[0].name == "palette":
+            raise InputError(
+                f"{file} has a colour table instead of bands: expand it, for instance with gdal_translate -expand rgb"
+            )
+        count = sum(colour.name != "alpha" for colour in colours)
+        return RasterHeader(
+            path=file,
+            crs=own,
+            grid=grid,
+            band_count=count,
+            band_names=tuple((text or "").lower() for text in source.descriptions[:count]),
+            dtype=source.dtypes[0],
+            square=abs(a + e) <= 1e-6 * a,
+            height_unit=_height_unit(source),
+            scale=source.scales[0],
+            offset=source.offsets[0],
+            alpha=count < len(colours) and colours[-1].name == "alpha",
+        )
+
+
+def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = None) -> Image:
+    """Read an orthoimage whole, on its own grid.
+
+    Parameters
+    ----------
+    path : path
+    bands : sequence of str, optional
+        Names in the order of the file; ``"-"`` skips one. Without it the descriptions in the file, else by number:
+        1 grey, 3 red, green, blue, 4 red, green, blue, nir.
+    """
+    header = _square(read_raster_header(path))
+    names = band_names(header, bands)
+    require_image_type(header)
+    with opened(header.path, opaque=is_opaque(header, names)) as source:
+        indexes, kept = _band_indexes(names)
+        values = source.read(indexes)
+        valid = _valid(source)
+    return Image(values, kept, header.grid, valid)
+
+
+def read_elevation(path: str | os.PathLike[str]) -> Elevation:
+    """Read an elevation model whole, on its own grid; cells without data are NaN."""
+    header = _square(read_raster_header(path))
+    with opened(header.path) as source:
+        values = source.read(1, masked=True).astype(np.float32).filled(np.nan)
+        values = values * np.float32(header.scale) + np.float32(header.offset)
+    return Elevation(values, header.grid)
+
+
+def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, ...]:
+    """Return one name per band of a file, ``"-"`` for those to skip."""
+    if bands is not None:
+        unknown = [name for name in bands if name not in (*BANDS, "-")]
+        if unknown:
+            raise InputError(f"--bands: {unknown[0]!r} is no band name; use {', '.join(BANDS)}, and - to skip one")
+        if len(bands) != header.band_count and not (header.alpha and len(bands) == header.band_count + 1):
+            raise InputError(
+                f"{header.path} has {header.band_count} bands, but --bands names {len(bands)} "
+                f"({','.join(bands)}): name one for each, - to skip one"
+            )
+        named = [name for name in bands if name != "-"]
+        if len(set(named)) != len(named) or not named:
+            raise InputError(f"--bands: {','.join(bands)} must name at least one band and none twice")
+        return tuple(bands)
+    if all(name in BANDS for name in header.band_names) and len(set(header.band_names)) == header.band_count:
+        return header.band_names
+    if header.band_count not in _DEFAULT_BANDS:
+        raise InputError(
+            f"{header.path} has {header.band_count} bands, expected 1 (grey), 3 (red, green, blue) or 4 (and nir): "
+            "name them with --bands, - to skip one"
+        )
+    return _DEFAULT_BANDS[header.band_count]
+
+
+def is_opaque(header: RasterHeader, names: Sequence[str]) -> bool:
+    """Return whether the names make a band of values of the one that is marked as alpha."""
+    return len(names) > header.band_count and names[-1] != "-"
+
+
+def looks_like_values(header: RasterHeader) -> bool:
+    """Return whether the band that is marked as alpha holds more than opaque and transparent."""
+    if not header.alpha:
+        return False
+    with opened(header.path) as source:
+        rows, columns = (min(side, 512) for side in source.shape)
+        values = np.unique(source.read(source.count, out_shape=(rows, columns)))
+    return len(values) > 8  # soft edges of a mosaic have some
+
+
+def write_image(image: Image, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
+    """Write an orthoimage as a tiled, compressed GeoTIFF with named bands and, where there is one, a mask."""
+    import rasterio
+
+    profile = _profile(image.grid, crs, len(image.bands), image.values.dtype.name)
+    photometric = {"photometric": "RGB"} if image.bands[:3] == ("red", "green", "blue") else {}
+    with (
+        rasterio.Env(GDAL_TIFF_INTERNAL_MASK=True),
+        rasterio.open(path, "w", predictor=2, **profile, **photometric) as target,
+    ):
+        target.write(image.values)
+        for index, name in enumerate(image.bands, start=1):
+            target.set_band_description(index, name)
+        if len(image.bands) == 4 and photometric:
+            target.colorinterp = [*target.colorinterp[:3], rasterio.enums.ColorInterp.undefined]
+        if image.valid is not None:
+            target.write_mask(image.valid)
+
+
+def write_elevation(elevation: Elevation, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
+    """Write an elevation model as a tiled, compressed float32 GeoTIFF; no data is NaN."""
+    import rasterio
+
+    profile = _profile(elevation.grid, crs, 1, "float32")
+    with rasterio.open(path, "w", predictor=3, nodata=float("nan"), **profile) as target:
+        target.write(elevation.values.astype(np.float32), 1)
+
+
+def _profile(grid: Grid, crs: str | None, count: int, dtype: str) -> dict[str, Any]:
+    from rasterio import Affine
+
+    return {
+        "driver": "GTiff",
+        "width": grid.columns,
+        "height": grid.rows,
+        "count": count,
+        "dtype": dtype,
+        "crs": crs,
+        "transform": Affine(*grid.transform),
+        "tiled": True,
+        "blockxsize": 256,
+        "blockysize": 256,
+        "compress": "deflate",
+        "bigtiff": "if_safer",
+    }
+
+
+@contextmanager
+def opened(file: Path, *, opaque: bool = False) -> Iterator[Any]:
+    """Open a raster; what rasterio raises inside the block becomes one sentence.
+
+    With `opaque` its alpha band is a band as others are, and masks nothing.
+    """
+    import warnings
+
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+
+    if not file.exists():
+        raise InputError(f"{file}: no such file")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)  # told as an error by read_raster_header
+            source = rasterio.open(file)
+        with source:
+            if not opaque:
+                yield source
+                return
+            with _without_alpha(source) as view:
+                yield view
+    except RasterioError as error:
+        cause = error.__cause__ or error
+        reason = " ".join(str(cause).split())
+        raise InputError(f"{file} cannot be read as an image ({reason}): give a GeoTIFF") from error
+
+
+@contextmanager
+def _without_alpha(source: Any) -> Iterator[Any]:
+    """Open a view of a raster in which no band is marked as alpha."""
+    import rasterio
+    from rasterio.enums import ColorInterp
+    from rasterio.io import MemoryFile
+    from rasterio.shutil import copy
+
+    with MemoryFile(ext=".vrt") as memory:
+        copy(source, memory.name, driver="VRT")
+        with rasterio.open(memory.name, "r+") as view:
+            view.colorinterp = [
+                ColorInterp.undefined if colour == ColorInterp.alpha else colour for colour in view.colorinterp
+            ]
+        with rasterio.open(memory.name) as view:
+            yield view
+
+
+def _source_crs(file: Path, source: Any) -> str | None:
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError as ProjError
+
+    try:
+        crs = CRS.from_wkt(source.crs.to_wkt())
+    except ProjError as error:
+        raise CRSError(f"{file}: its CRS cannot be read ({error}): set it with gdal_edit.py -a_srs") from error
+    return crs_text(crs)
+
+
+def _square(header: RasterHeader) -> RasterHeader:
+    if not header.square:
+        raise InputError(f"{header.path}: its cells are not square: warp it, for instance with gdalwarp -tr")
+    return header
+
+
+def _height_unit(source: Any) -> str | None:
+    """Return the unit of the values when band or vertical CRS name one that is not metres."""
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError as ProjError
+
+    unit = str(source.units[0] or "")
+    if unit.lower() not in ("", "m", "metre", "metres", "meter", "meters"):
+        return unit
+    try:
+        crs = CRS.from_wkt(source.crs.to_wkt()) if source.crs else None
+    except ProjError:
+        return None
+    for part in crs.sub_crs_list if crs is not None else ():
+        for axis in part.axis_info:
+            if axis.direction == "up" and abs(axis.unit_conversion_factor - 1.0) > 1e-9:
+                return str(axis.unit_name)
+    return None
+
+
+def _band_indexes(names: Sequence[str]) -> tuple[list[int], tuple[str, ...]]:
+    indexes = [index for index, name in enumerate(names, start=1) if name != "-"]
+    return indexes, tuple(name for name in names if name != "-")
+
+
+def require_image_type(header: RasterHeader) -> None:
+    """Raise `InputError` unless the values can be those of an orthoimage."""
+    if header.dtype not in ("uint8", "uint16"):
+        raise InputError(
+            f"{header.path} has {header.dtype} values, an orthoimage needs uint8 or uint16: convert it, for instance "
+            "with gdal_translate -ot Byte -scale"
+        )
+
+
+def _valid(source: Any) -> NDArray[np.bool_] | None:
+    """Return where the image has data; None when everywhere."""
+    mask = source.dataset_mask() > 0
+    return None if mask.all() else mask

@@ -1,0 +1,162 @@
+"""Mosaics: orthoimages and elevation models of several files, cell sizes and CRS brought to one grid.
+
+Files whose cells coincide with those of the grid are copied, others are resampled: averaged when their cells are much
+smaller, else bilinear. Where files overlap the first that has data wins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import CRSError, InputError
+from .crs import crs_label, same_crs
+from .raster import Elevation, Grid, Image
+from .raster_files import RasterHeader, band_names, is_opaque, opened, require_image_type
+
+__all__ = ["mosaic_elevation", "mosaic_image", "resampling_note", "warped_extent", "warped_size"]
+
+
+def mosaic_image(headers: Sequence[RasterHeader], grid: Grid, *, crs: str, bands: Sequence[str] | None = None) -> Image:
+    """Bring one or several orthoimages to `grid` in `crs`; a file that names no CRS is taken to be in it.
+
+    Files whose cells coincide with those of `grid` are copied, others resampled: averaged when their cells are much
+    smaller, else bilinear.
+    """
+    named = [band_names(header, bands) for header in headers]
+    kept = tuple(name for name in named[0] if name != "-")
+    for header, names in zip(headers, named, strict=True):
+        if set(names) - {"-"} != set(kept):
+            raise InputError(
+                f"{header.path} has the bands {', '.join(names)} but {headers[0].path} {', '.join(kept)}: "
+                "images of one scene must have the same"
+            )
+        require_image_type(header)
+        if header.dtype != headers[0].dtype:
+            raise InputError(
+                f"{header.path} is {header.dtype} but {headers[0].path} {headers[0].dtype}: convert one of them, "
+                "for instance with gdal_translate -ot"
+            )
+    values = np.zeros((len(kept), *grid.shape), dtype=headers[0].dtype)
+    valid = np.zeros(grid.shape, dtype=bool)
+    for header, names in zip(headers, named, strict=True):
+        indexes = [names.index(name) + 1 for name in kept]
+        for rows, columns, block, has_data in _warped(header, indexes, grid, crs, opaque=is_opaque(header, names)):
+            fresh = has_data & ~valid[rows, columns]
+            values[:, rows, columns][:, fresh] = block[:, fresh]
+            valid[rows, columns] |= fresh
+    return Image(values, kept, grid, None if valid.all() else valid)
+
+
+def mosaic_elevation(headers: Sequence[RasterHeader], grid: Grid, *, crs: str) -> Elevation:
+    """Bring one or several elevation models to `grid` in `crs`; cells without data are NaN."""
+    values = np.full(grid.shape, np.nan, dtype=np.float32)
+    for header in headers:
+        if header.band_count != 1:
+            raise InputError(f"{header.path} has {header.band_count} bands, expected an elevation model of one band")
+        if header.height_unit is not None:
+            raise CRSError(
+                f"{header.path}: its heights are in {header.height_unit}, metres are needed: convert them, for "
+                "instance with gdal_calc.py"
+            )
+        for rows, columns, block, has_data in _warped(header, [1], grid, crs):
+            fresh = has_data & np.isfinite(block[0]) & np.isnan(values[rows, columns])
+            values[rows, columns][fresh] = block[0][fresh] * header.scale + header.offset
+    return Elevation(values, grid)
+
+
+def warped_extent(header: RasterHeader, crs: str) -> tuple[float, float, float, float]:
+    """Return the extent of a raster, ``(xmin, ymin, xmax, ymax)``, in another CRS."""
+    if header.crs is None or same_crs(header.crs, crs):
+        return header.grid.extent
+    from rasterio.errors import RasterioError
+    from rasterio.warp import transform_bounds
+
+    try:
+        bounds: tuple[float, float, float, float] = transform_bounds(header.crs, crs, *header.grid.extent)
+    except RasterioError as error:
+        raise CRSError(
+            f"{header.path} cannot be transformed from {crs_label(header.crs)} to {crs_label(crs)}: "
+            "it is probably in another CRS than it names"
+        ) from error
+    return bounds
+
+
+def warped_size(header: RasterHeader, crs: str) -> float:
+    """Return the cell size in metres, to two digits, that keeps the detail of a raster in another CRS."""
+    if header.crs is None or same_crs(header.crs, crs):
+        return header.grid.gsd
+    from rasterio.warp import calculate_default_transform
+
+    grid = header.grid
+    transform, _, _ = calculate_default_transform(header.crs, crs, grid.columns, grid.rows, *grid.extent)
+    return float(f"{transform.a:.2g}")
+
+
+def _warped(
+    header: RasterHeader, indexes: list[int], grid: Grid, crs: str, *, opaque: bool = False
+) -> Iterator[tuple[slice, slice, NDArray[Any], NDArray[np.bool_]]]:
+    """Yield (rows, columns, values, has data) of the part of `grid` that a file covers, by bands of rows."""
+    from rasterio import Affine
+    from rasterio.enums import Resampling
+    from rasterio.vrt import WarpedVRT
+
+    warp = header.crs is not None and not same_crs(header.crs, crs)
+    bounds = warped_extent(header, crs)
+    columns = _span(bounds[0], bounds[2], grid.west, grid.gsd, grid.columns)
+    rows = _span(-bounds[3], -bounds[1], -grid.north, grid.gsd, grid.rows)
+    if columns is None or rows is None:
+        return
+    with opened(header.path, opaque=opaque) as source:
+        ratio = grid.gsd / header.grid.gsd
+        resampling = Resampling.average if ratio > 1.5 else Resampling.bilinear
+        if not warp and header.square and _same_cells(grid, header.grid):
+            resampling = Resampling.nearest
+        for start in range(rows.start, rows.stop, 1024):
+            stop = min(start + 1024, rows.stop)
+            corner = grid.to_world(start, columns.start)
+            with WarpedVRT(
+                source,
+                src_crs=header.crs if warp else crs,
+                crs=crs,
+                transform=Affine(grid.gsd, 0, float(corner[0]), 0, -grid.gsd, float(corner[1])),
+                width=columns.stop - columns.start,
+                height=stop - start,
+                resampling=resampling,
+                add_alpha=source.nodata is None and not _has_alpha(source),
+            ) as view:
+                block = view.read(indexes)
+                has_data = view.dataset_mask() > 0
+            yield slice(start, stop), columns, block, has_data
+
+
+def _has_alpha(source: Any) -> bool:
+    return any(colour.name == "alpha" for colour in source.colorinterp)
+
+
+def _span(low: float, high: float, origin: float, gsd: float, count: int) -> slice | None:
+    """Return the cells of one axis of a grid that a file's range meets, or None."""
+    first = max(0, int(np.floor((low - origin) / gsd + 1e-6)))
+    last = min(count, int(np.ceil((high - origin) / gsd - 1e-6)))
+    return slice(first, last) if last > first else None
+
+
+def _same_cells(one: Grid, two: Grid) -> bool:
+    """Return whether the cells of two grids coincide."""
+    shift = np.array([(one.west - two.west) / one.gsd, (one.north - two.north) / one.gsd])
+    return abs(one.gsd - two.gsd) <= 1e-6 * one.gsd and bool((abs(shift - np.round(shift)) < 1e-3).all())
+
+
+def resampling_note(header: RasterHeader, crs: str, grid: Grid) -> str | None:
+    """Return the sentence that tells how a file is brought to a scene's grid, or None when it is copied as it is."""
+    reasons = []
+    if header.crs is not None and not same_crs(header.crs, crs):
+        reasons.append(f"from {crs_label(header.crs)} to {crs_label(crs)}")
+    if not header.square or abs(header.grid.gsd - grid.gsd) > 1e-6 * grid.gsd:
+        reasons.append(f"to cells of {grid.gsd:g} m")
+    elif not reasons and not _same_cells(grid, header.grid):
+        reasons.append("by a fraction of a cell")
+    return f"{header.path.name} was resampled {' and '.join(reasons)}" if reasons else None

@@ -1,0 +1,399 @@
+"""Vector files: footprints read from and written to GeoJSON, GeoPackage, Shapefile, FlatGeobuf and GeoParquet.
+
+A layer of a file with several is named as QGIS does, ``city.gpkg|layername=roofs``, or by ``layer=``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...core.errors import CRSError, InputError, OutputError
+from ...core.output import whole_file
+from ...core.registry import nearest_hint
+from .crs import common_crs, crs_label, named_crs, parse_crs, require_metric, same_crs
+from .footprints import Footprints, Repair
+from .vector_columns import storable_columns
+
+__all__ = [
+    "DRIVERS",
+    "output_driver",
+    "read_footprints",
+    "read_polygon",
+    "split_layer",
+    "write_footprints",
+    "write_layers",
+]
+
+#: Geometry type of shapely to that of OGR.
+_KINDS = {1: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon", 0: "Point", 4: "MultiPoint"}
+#: File ending to GDAL driver; GeoParquet is read and written by geopandas (extra ``parquet``).
+DRIVERS: Mapping[str, str] = {
+    ".geojson": "GeoJSON",
+    ".json": "GeoJSON",
+    ".gpkg": "GPKG",
+    ".shp": "ESRI Shapefile",
+    ".fgb": "FlatGeobuf",
+    ".parquet": "Parquet",
+    ".geoparquet": "Parquet",
+}
+
+
+def split_layer(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
+    """Split QGIS's ``file|layername=NAME``.
+
+    >>> split_layer("city.gpkg|layername=roofs")
+    (PosixPath('city.gpkg'), 'roofs')
+    """
+    text, bar, layer = os.fspath(path).partition("|layername=")
+    return Path(text), layer if bar else None
+
+
+def read_footprints(
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    building_id: str | None = None,
+    crs: str | None = None,
+    to_crs: str | None = None,
+) -> Footprints:
+    """Read footprints from a vector file.
+
+    Parameters
+    ----------
+    path : path
+        File, with ``|layername=NAME`` where it has several layers.
+    layer : str, optional
+        Layer name; not needed for a file of one layer.
+    building_id : str, optional
+        Column that tells which footprints are parts of one building. Without it a column called ``building_id`` is
+        used where there is one, else every polygon is its own building. A row with no value is its own building.
+    crs : str, optional
+        CRS to assign, for files that have none or the wrong one; coordinates are not changed.
+    to_crs : str, optional
+        CRS to transform to; a file of unknown CRS is taken to be in it already.
+
+    Notes
+    -----
+    A GeoJSON file that names no CRS is in degrees by RFC 7946. When its coordinates cannot be degrees, its CRS is
+    taken as not known.
+
+    Raises
+    ------
+    InputError
+        Missing or unreadable file, unknown layer or column, no polygons.
+    CRSError
+        Geographic CRS or one that is not in metres.
+    """
+    file, named = split_layer(path)
+    layer = layer or named
+    if not file.exists():
+        raise InputError(f"{file}: no such file")
+    if crs is not None:
+        crs = named_crs(crs)
+    closed: list[Repair] = []
+    if DRIVERS.get(file.suffix.lower()) == "Parquet":
+        geometries, columns, own_crs = _read_parquet(file)
+    else:
+        geometries, columns, own_crs, closed = _read_ogr(file, layer)
+    if crs is None and own_crs == "EPSG:4326" and not _means_degrees(file, geometries):
+        own_crs = None
+    crs = crs or own_crs
+    if to_crs is not None:
+        geometries, crs = _transformed(file, geometries, crs or to_crs, to_crs), to_crs
+    if len(geometries):
+        require_metric(crs, str(file), heights=False)
+    identifiers = _building_ids(file, columns, building_id)
+    footprints = Footprints.of(geometries, building_ids=identifiers, crs=crs, attributes=columns, source=str(file))
+    told = {repair.id for repair in footprints.repairs}
+    more = [repair for repair in closed if repair.id not in told]
+    if more:
+        repairs = sorted([*footprints.repairs, *more], key=lambda repair: repair.id)
+        footprints = dataclasses.replace(footprints, repairs=tuple(repairs))
+    if len(geometries) and not len(footprints):
+        kinds = sorted({repair.problem for repair in footprints.repairs})
+        raise InputError(f"{file}: no polygons among {len(geometries)} features ({'; '.join(kinds[:3])})")
+    return footprints
+
+
+def read_polygon(
+    path: str | os.PathLike[str], *, crs: str | None = None, common_with: Footprints | None = None
+) -> shapely.Geometry:
+    """Read an area: the union of all polygons of a file.
+
+    Parameters
+    ----------
+    path : path
+    crs : str, optional
+        CRS to assign.
+    common_with : Footprints, optional
+        Set whose CRS the file must share.
+    """
+    footprints = read_footprints(path, crs=crs)
+    if not len(footprints):
+        raise InputError(f"{path}: no polygons: an evaluation area needs at least one")
+    if common_with is not None and len(common_with):
+        common_crs(footprints.crs, common_with.crs, (footprints.source, common_with.source))
+    return shapely.union_all(footprints.polygons)
+
+
+def write_footprints(
+    footprints: Footprints,
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    overwrite: bool = False,
+) -> None:
+    """Write footprints, their building ids and attributes; the file appears whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        Unknown file ending, file that exists already, folder that is missing or read-only.
+    """
+    columns = dict(footprints.attributes)
+    if footprints.building_ids is not None:
+        columns["building_id"] = footprints.building_ids
+    file = Path(path)
+    name = layer or file.stem
+    write_layers({name: (footprints.polygons, columns)}, file, crs=footprints.crs, overwrite=overwrite)
+
+
+def output_driver(path: str | os.PathLike[str]) -> str:
+    """Return the GDAL driver that the ending of a file to be written names, or raise `OutputError`."""
+    file = Path(path)
+    driver = DRIVERS.get(file.suffix.lower())
+    if driver is None:
+        raise OutputError(
+            f"{file}: unknown file ending {file.suffix!r}{nearest_hint(file.suffix, DRIVERS)}; "
+            f"roofbench writes {', '.join(DRIVERS)}"
+        )
+    return driver
+
+
+def write_layers(
+    layers: Mapping[str, tuple[NDArray[np.object_], Mapping[str, NDArray[Any]]]],
+    path: str | os.PathLike[str],
+    *,
+    crs: str | None,
+    overwrite: bool = False,
+) -> None:
+    """Write named layers of (geometries, columns) into one file; only GeoPackage takes more than one.
+
+    Lines and polygons may be mixed between layers, not within one.
+    """
+    file = Path(path)
+    driver = output_driver(file)
+    if len(layers) > 1 and driver != "GPKG":
+        raise OutputError(f"{file}: {len(layers)} layers ({', '.join(layers)}) need a GeoPackage: name it .gpkg")
+    if crs is not None:
+        known = parse_crs(crs)
+        if driver == "GeoJSON" and known.to_authority(min_confidence=100) is None:
+            raise OutputError(
+                f"{file}: GeoJSON names a CRS by its EPSG code, and {known.name!r} has none: write a GeoPackage (.gpkg)"
+            )
+    with whole_file(file, overwrite=overwrite) as scratch:
+        for number, (layer, (geometries, table)) in enumerate(layers.items()):
+            columns = storable_columns(table, driver, file)
+            if driver == "GPKG" and layer.lower().startswith(("gpkg", "sqlite")):
+                layer = f"layer_{layer}"
+            if driver == "Parquet":
+                _write_parquet(scratch, geometries, columns, crs)
+            else:
+                _write_ogr(scratch, driver, layer, geometries, columns, crs, append=number > 0)
+
+
+def _read_ogr(
+    file: Path, layer: str | None
+) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None, list[Repair]]:
+    import pyogrio.raw
+    from pyogrio.errors import DataLayerError, DataSourceError
+
+    if file.is_dir() and file.suffix.lower() != ".gdb":
+        raise InputError(f"{file} is a folder: name a vector file, for instance .gpkg or .geojson")
+    try:
+        listed = pyogrio.list_layers(file)
+        names = [str(name) for name, kind in listed if kind is not None] or [str(name) for name in listed[:, 0]]
+        if layer is None and len(names) > 1:
+            raise InputError(
+                f"{file} has {len(names)} layers ({', '.join(names)}): name one as '{file}|layername={names[0]}'"
+            )
+        if layer is not None and layer not in names:
+            raise InputError(f"{file} has no layer {layer!r}{nearest_hint(layer, names)}; it has {', '.join(names)}")
+        with _quiet():
+            meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0])
+    except (DataSourceError, DataLayerError) as error:
+        reason = " ".join(str(error).partition("; It might help")[0].split())
+        raise InputError(f"{file} cannot be read as a vector file: {reason}") from error
+    if wkb is None:
+        raise InputError(f"{file}: no polygons: the layer {layer or names[0]!r} has no geometry")
+    columns = dict(zip(map(str, meta["fields"]), fields, strict=True))
+    if file.suffix.lower() == ".shp" and "building_i" in columns:
+        columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name
+    geometries, closed = _geometries(wkb)
+    return geometries, columns, meta["crs"], closed
+
+
+def _geometries(wkb: NDArray[np.object_]) -> tuple[NDArray[np.object_], list[Repair]]:
+    """Return geometries of WKB; rings that end elsewhere than they began are closed and reported."""
+    closed = []
+    with np.errstate(invalid="ignore"):  # coordinates that are NaN: left out and told by Footprints.of
+        geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
+        unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
+        for row in unread:
+            geometries[row] = shapely.from_wkb(wkb[row], on_invalid="fix")
+            closed.append(Repair(int(row), "a ring that is not closed", "mended"))
+    return geometries, closed
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep GDAL's warnings about what is meant (no CRS, short names, NaN in JSON) from the user."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None]:
+    geopandas = _parquet_support(file, InputError)
+    try:
+        frame = geopandas.read_parquet(file)
+    except (ValueError, OSError) as error:
+        raise InputError(f"{file} cannot be read as GeoParquet: {' '.join(str(error).split())}") from error
+    columns = {}
+    for name in frame.columns:
+        if name != frame.geometry.name:
+            values = frame[name].to_numpy()
+            if values.dtype.kind == "O":
+                values = np.where(frame[name].isna(), None, values)
+            columns[str(name)] = values
+    return np.asarray(frame.geometry.array, dtype=object), columns, _crs_text(frame.crs)
+
+
+def _write_ogr(
+    file: Path,
+    driver: str,
+    layer: str,
+    geometries: NDArray[np.object_],
+    columns: Mapping[str, NDArray[Any]],
+    crs: str | None,
+    *,
+    append: bool,
+) -> None:
+    import pyogrio
+    import pyogrio.raw
+    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
+
+    kinds = [_KINDS.get(int(kind), "Unknown") for kind in np.unique(shapely.get_type_id(geometries))] or ["Polygon"]
+    kind = kinds[0] if len(kinds) == 1 else "Multi" + min(kinds, key=len)
+    # A GeoPackage stores when it was written; a fixed date makes equal content equal bytes, which scenes rely on.
+    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": "2000-01-01T00:00:00.000Z"})
+    try:
+        with _quiet():
+            pyogrio.raw.write(
+                file,
+                geometry=shapely.to_wkb(geometries, flavor="iso"),
+                field_data=[np.ma.getdata(column) for column in columns.values()],
+                fields=np.array(list(columns), dtype=object),
+                layer=layer,
+                driver=driver,
+                geometry_type=kind,
+                promote_to_multi=kind.startswith("Multi"),
+                field_mask=[np.ma.getmaskarray(column) for column in columns.values()] if columns else None,
+                crs=crs,
+                append=append,
+                # The index of FlatGeobuf would put the rows into another order.
+                **({"SPATIAL_INDEX": "NO"} if driver == "FlatGeobuf" else {}),
+            )
+    except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
+        raise OutputError(f"{file.name} cannot be written: {error}") from error
+    finally:
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": None})
+    if driver == "GeoJSON" and crs is None:
+        _say_no_crs(file)
+
+
+def _say_no_crs(file: Path) -> None:
+    """Add ``"crs": null``, without which a GeoJSON file would say that it is in degrees."""
+    start = '"type": "FeatureCollection",'
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace(start, f'{start}\n"crs": null,', 1), encoding="utf-8")
+
+
+def _write_parquet(
+    file: Path, geometries: NDArray[np.object_], columns: Mapping[str, NDArray[Any]], crs: str | None
+) -> None:
+    geopandas = _parquet_support(file, OutputError)
+    frame = geopandas.GeoDataFrame(dict(columns), geometry=list(geometries), crs=crs)
+    frame.to_parquet(file)
+
+
+def _parquet_support(file: Path, error: type[InputError] | type[OutputError]) -> Any:
+    try:
+        import geopandas
+        import pyarrow.parquet  # noqa: F401
+    except ImportError as missing:
+        raise error(f"{file.name}: GeoParquet needs pyarrow: pip install 'roofbench[parquet]'") from missing
+    return geopandas
+
+
+def _crs_text(crs: Any) -> str | None:
+    if crs is None:
+        return None
+    authority = crs.to_authority()
+    return ":".join(authority) if authority else str(crs.to_wkt())
+
+
+def _building_ids(file: Path, columns: Mapping[str, NDArray[Any]], name: str | None) -> NDArray[Any] | None:
+    """Return the building of each row; rows without a value get one of their own."""
+    if name is None:
+        if "building_id" not in columns:
+            return None
+        name = "building_id"
+    if name not in columns and file.suffix.lower() == ".shp" and name[:10] in columns:
+        name = name[:10]
+    if name not in columns:
+        raise InputError(
+            f"{file} has no column {name!r}{nearest_hint(name, columns)}; it has {', '.join(columns) or 'none'}"
+        )
+    return columns[name]
+
+
+def _means_degrees(file: Path, geometries: NDArray[np.object_]) -> bool:
+    """Return False for a GeoJSON that is taken as WGS 84 (RFC 7946) though it is empty, says null, or cannot be."""
+    if DRIVERS.get(file.suffix.lower()) != "GeoJSON":
+        return True
+    if not len(geometries):
+        return False
+    with file.open(encoding="utf-8", errors="replace") as stream:
+        if re.search(r'"crs"\s*:\s*null', stream.read(4096)):
+            return False
+    bounds = np.abs(shapely.total_bounds(geometries))
+    return not (max(bounds[0], bounds[2]) > 360 or max(bounds[1], bounds[3]) > 90)
+
+
+def _transformed(file: Path, geometries: NDArray[np.object_], crs: str, to_crs: str) -> NDArray[np.object_]:
+    """Return the geometries in another CRS, without Z, axis order x, y on both sides."""
+    import pyproj
+
+    if same_crs(crs, to_crs):
+        return geometries
+    transformer = pyproj.Transformer.from_crs(parse_crs(crs), parse_crs(to_crs), always_xy=True)
+    flat = shapely.force_2d(geometries)
+    moved = shapely.transform(flat, lambda points: np.column_stack(transformer.transform(*points.T)))
+    if (np.isfinite(shapely.get_coordinates(flat)) & ~np.isfinite(shapely.get_coordinates(moved))).any():
+        raise CRSError(
+            f"{file}: its coordinates cannot be transformed from {crs_label(crs)} to {crs_label(to_crs)}: "
+            "it is probably in another CRS, name it"
+        )
+    return np.asarray(moved, dtype=object)

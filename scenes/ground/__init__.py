@@ -1,0 +1,1 @@
+"""Bare earth, and heights above it."""

@@ -1,0 +1,351 @@
+"""Bare earth from laser points: elevation models of ground points, and a ground filter where nobody told them apart.
+
+Nouns
+-----
+lowest surface
+    Per cell the lowest point that is not isolated, metres.
+object
+    A connected region of cells that an opening of the lowest surface removes and that stands on walls: a roof, a
+    crown, a bridge. A hill top, which an opening removes too, ends without walls and stays ground.
+wall
+    A step of the lowest surface by more than the wall height within two cells, beyond the slope of its surroundings.
+
+The filter is a progressive opening with growing windows and a height threshold that grows with the window (Zhang et
+al. 2003, "A progressive morphological filter for removing nonground measurements from airborne LIDAR data", IEEE TGRS
+41(4); Pingel, Clarke & McBride 2013, "An improved simple morphological filter", ISPRS J. 77), taken relative to the
+coarse trend of the land, so that a slope costs nothing, with the test for walls added, so that windows as wide as the
+largest halls do not cut hills. Axis order of grids: (row, column), row 0 northernmost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..geodata.points import PointCloud
+from ..geodata.raster import Elevation, Grid
+from .lowest_points import default_cell, lowest_surface, mean_above
+
+__all__ = ["elevation_from_points", "fill_unknown", "ground_surface"]
+
+_Floats = NDArray[np.float32]
+_Mask = NDArray[np.bool_]
+
+#: Size in metres of the blocks whose lowest heights tell the trend.
+_TREND_BLOCK = 5.0
+#: Windows up to this radius in metres remove what they remove, walls or not: shrubs and crowns have ragged borders.
+_NARROW = 6.0
+#: Gaps of the points wider than twice this, metres, are no surface between what lies around: water, the scene's rim.
+_GAP = 3.0
+#: Points put on the grid at a time, so that a large cloud is not copied.
+_CHUNK = 2_000_000
+#: Share of the border of a wide object that must be wall.
+_WALLED = 0.7
+
+
+def ground_surface(
+    points: PointCloud,
+    extent: Sequence[float],
+    *,
+    cell: float | None = None,
+    largest_object: float = 100.0,
+    slope: float = 0.15,
+    wall_height: float = 1.0,
+    tolerance: float = 0.4,
+) -> Elevation:
+    """Return the bare earth below all points, whatever they were reflected by.
+
+    Parameters
+    ----------
+    points : PointCloud
+        Any returns; points that are not finite are left out.
+    extent : sequence of float
+        ``(xmin, ymin, xmax, ymax)``, metres.
+    cell : float, optional
+        Cell size in metres; by default 1 m, more where the points are so sparse that a cell would hold less than two.
+    largest_object : float
+        Width in metres up to which an object is taken off the ground.
+    slope : float
+        Rise over run, besides that of the trend, that is still ground.
+    wall_height : float
+        Least step, metres, at the border of an object.
+    tolerance : float
+        Lowest points nearer than this, metres, to the ground found are ground themselves.
+
+    Returns
+    -------
+    Elevation
+        Known everywhere, unless there is no point at all (then NaN).
+    """
+    x, y, z = _finite(points)
+    grid = Grid.covering(extent, cell or default_cell(x, y, extent))
+    lowest = lowest_surface(x, y, z, grid)
+    if np.isnan(lowest).all():
+        return Elevation(lowest, grid)
+    trend = _trend(lowest, grid.gsd, largest_object)
+    relief = lowest - trend
+    objects = _objects(relief, grid.gsd, largest_object, slope, wall_height)
+    ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
+    # Cut hill tops and the feet of shrubs come back; what they add lets the next round reach a little further.
+    for _ in range(2):
+        again = objects & (np.abs(relief - ground) < tolerance)
+        if not again.any():
+            break
+        objects &= ~again
+        ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
+    return _averaged(x, y, z, grid, ground + trend, tolerance)
+
+
+def elevation_from_points(
+    points: PointCloud, extent: Sequence[float], *, cell: float | None = None, classes: Sequence[int] | None = None
+) -> Elevation:
+    """Return the mean height of points per cell, with cells without points interpolated.
+
+    Made for points that are known to be ground; a cloud without a finite point gives NaN everywhere.
+
+    Parameters
+    ----------
+    points : PointCloud
+    extent : sequence of float
+        ``(xmin, ymin, xmax, ymax)``, metres.
+    cell : float, optional
+        Cell size in metres; by default as in `ground_surface`.
+    classes : sequence of int, optional
+        Use only points of these ASPRS classes; all when not given.
+    """
+    grid = Grid.covering(extent, cell or default_cell(points.x, points.y, extent))
+    size = grid.rows * grid.columns
+    count, total = np.zeros(size, dtype=np.int64), np.zeros(size)
+    # Heights above sea are large against the spread in a cell.
+    base = float(points.z[np.isfinite(points.z).argmax()]) if np.isfinite(points.z).any() else 0.0
+    for start in range(0, len(points), _CHUNK):
+        part = points.take(slice(start, start + _CHUNK))
+        if classes is not None and part.classification is not None:
+            part = part.take(np.isin(part.classification, classes))
+        x, y, z = _finite(part)
+        index, inside = grid.cells(x, y)
+        index = index[inside]
+        count += np.bincount(index, minlength=size)
+        total += np.bincount(index, weights=z[inside] - base, minlength=size)
+    mean = np.full(size, np.nan)
+    np.divide(total, count, out=mean, where=count > 0)
+    return Elevation(fill_unknown((mean + base).astype(np.float32).reshape(grid.shape)), grid)
+
+
+def fill_unknown(values: _Floats) -> _Floats:
+    """Return the values with NaN replaced by a smooth surface through the known ones (all NaN stays NaN).
+
+    Pull and push: unknown cells take the bilinear value of the filled grid of half the resolution, and each level is
+    then relaxed towards the mean of the four neighbours (membrane), so that a gap in a slope is filled along it.
+    """
+    known = np.isfinite(values)
+    if known.all() or not known.any():
+        return values.astype(np.float32)
+    # Heights above sea are large against the float32 step of their sums.
+    base = np.float32(values[known].mean())
+    filled = _pull_push(np.where(known, values - base, 0).astype(np.float32), known)
+    filled += base
+    filled[known] = values[known]
+    return filled
+
+
+def _pull_push(values: _Floats, known: _Mask) -> _Floats:
+    import cv2
+
+    rows, columns = values.shape
+    if not known.all() and max(rows, columns) > 1:
+        even = ((0, rows % 2), (0, columns % 2))
+        weight = _blocks(np.pad(known.astype(np.float32), even))
+        total = _blocks(np.pad(values * known, even))
+        mean: _Floats = (total / np.maximum(weight, 1)).astype(np.float32)
+        coarse = _pull_push(mean, weight > 0)
+        finer = cv2.resize(coarse, (columns + columns % 2, rows + rows % 2), interpolation=cv2.INTER_LINEAR)
+        values = np.where(known, values, finer[:rows, :columns])
+        _relax(values, known, 20)
+    return values
+
+
+def _blocks(values: _Floats) -> _Floats:
+    return values[::2, ::2] + values[1::2, ::2] + values[::2, 1::2] + values[1::2, 1::2]
+
+
+@njit(cache=True)
+def _relax(values, known, rounds):  # type: ignore[no-untyped-def]
+    """Move unknown cells to the mean of their neighbours, in place, `rounds` sweeps in alternating order."""
+    rows, columns = values.shape
+    for sweep in range(rounds):
+        for i in range(rows):
+            r = i if sweep % 2 == 0 else rows - 1 - i
+            for j in range(columns):
+                c = j if sweep % 2 == 0 else columns - 1 - j
+                if known[r, c]:
+                    continue
+                total, count = 0.0, 0
+                if r > 0:
+                    total += values[r - 1, c]
+                    count += 1
+                if r < rows - 1:
+                    total += values[r + 1, c]
+                    count += 1
+                if c > 0:
+                    total += values[r, c - 1]
+                    count += 1
+                if c < columns - 1:
+                    total += values[r, c + 1]
+                    count += 1
+                values[r, c] = total / count
+
+
+def _finite(points: PointCloud) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    finite = np.isfinite(points.x) & np.isfinite(points.y) & np.isfinite(points.z)
+    if finite.all():
+        return points.x, points.y, points.z
+    return points.x[finite], points.y[finite], points.z[finite]
+
+
+def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
+    """Return the coarse lie of the land: local planes, fitted to the low parts of a surface, on its grid.
+
+    Locally weighted regression over ever smaller neighbourhoods; what lies above the trend counts less each round, so
+    that an object narrower than `largest` (metres) does not lift it. A hill does: its flanks lead up to its top.
+    """
+    block = max(1, round(_TREND_BLOCK / cell))
+    rows, columns = (-(-size // block) for size in surface.shape)
+    padded = np.full((rows * block, columns * block), np.inf, dtype=np.float32)
+    padded[: surface.shape[0], : surface.shape[1]] = np.where(np.isnan(surface), np.float32(np.inf), surface)
+    low = padded.reshape(rows, block, columns, block).min(axis=(1, 3)).astype(np.float64)
+    known = np.isfinite(low)
+    base = low[known].min()
+    height = np.where(known, low - base, 0)
+    weight = known.astype(np.float64)
+    trend = np.zeros(low.shape)
+    for share in (1.0, 1.0, 0.5, 0.5, 0.25, 0.25, 0.25):
+        trend = _local_planes(height, weight, share * largest / (cell * block))
+        above = height - trend
+        spread = 1.4826 * np.median(np.abs(above[known])) + 0.1
+        weight = known / (1 + (np.where(above > 0, 2, 0.5) * above / spread) ** 2)
+    # Planes run away where there is nothing around that they could be fitted to.
+    trend = fill_unknown(np.where(known, trend, np.nan).astype(np.float32)).astype(np.float64)
+    # Samples at the border lie beyond the centres of the outer blocks.
+    outer = np.pad(trend, 1, mode="reflect", reflect_type="odd") if min(trend.shape) > 1 else np.pad(trend, 1, "edge")
+    blocks = Elevation(outer.astype(np.float32), Grid(-block, block, block, rows + 2, columns + 2))
+    lie = np.empty(surface.shape, dtype=np.float32)
+    column = np.arange(surface.shape[1])
+    for row in range(len(lie)):
+        lie[row] = blocks.sample(column + 0.5, -row - 0.5) + base
+    return lie
+
+
+def _local_planes(height: NDArray[np.float64], weight: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+    """Return at each cell the value of the weighted least-squares plane of its Gaussian neighbourhood."""
+    import cv2
+
+    place: NDArray[np.float64] = np.indices(height.shape, dtype=np.float64)
+    y, x = place[0], place[1]
+
+    def blurred(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT))
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return blurred(weight * values) / total
+
+    total = np.maximum(blurred(weight), 1e-12)
+    mx, my, mz = mean(x), mean(y), mean(height)
+    # A little of the neighbourhood's own spread keeps the slope defined where all weight is on one line.
+    ridge = 1e-3 * sigma**2
+    xx, yy, xy = mean(x * x) - mx * mx + ridge, mean(y * y) - my * my + ridge, mean(x * y) - mx * my
+    xz, yz = mean(x * height) - mx * mz, mean(y * height) - my * mz
+    determinant = xx * yy - xy * xy
+    across, down = (xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant
+    return np.asarray(mz + across * (x - mx) + down * (y - my))
+
+
+def _objects(relief: _Floats, cell: float, largest: float, slope: float, wall_height: float) -> _Mask:
+    """Return the cells of objects: removed by an opening and, where the window is wide, standing on walls."""
+    import cv2
+
+    objects = np.zeros(relief.shape, dtype=bool)
+    # Gaps within the scene are filled, and what was measured nowhere around is like what lies beyond the scene.
+    beyond = _beyond(np.isnan(relief), _GAP / cell)
+    surface, walls = fill_unknown(relief), None
+    for radius in _radii(largest / 2 / cell, min(relief.shape)):
+        if radius * cell > _NARROW and walls is None:
+            # Narrower windows have taken the trees off: what steps down in the surface between them is a roof.
+            walls = _wall_cells(surface, wall_height)
+        window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * radius + 1, 2 * radius + 1))
+        # Windows centred beyond hang over: they would hold a roof's rim and nothing else.
+        lowest = cv2.erode(np.where(beyond, np.float32(np.inf), surface), window)
+        opened = cv2.dilate(np.where(beyond, np.float32(-np.inf), lowest), window)
+        removed = ~beyond & (surface - opened > np.minimum(0.3 + slope * radius * cell, 2.0))
+        if walls is not None:
+            removed = _standing(removed, walls, beyond)
+            # The rest of a roof of which a wing is gone stands on the cut, too.
+            walls |= cv2.dilate(removed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        objects |= removed
+        surface = np.where(removed, opened, surface)
+    return objects
+
+
+def _radii(largest: float, size: int) -> list[int]:
+    """Window radii in cells, 1, 2, 3, 4, 6, 8, 12 ... up to the largest, none wider than the grid."""
+    radii, radius = [], 1.0
+    while True:
+        radii.append(round(radius))
+        if radius >= largest or 2 * radius + 1 >= size:
+            return sorted(set(radii))
+        radius = min(radius + max(1.0, radius * 0.41), largest)
+
+
+def _wall_cells(relief: _Floats, height: float) -> _Mask:
+    """Return the cells above a step: the fall within two cells, less half the rise, exceeds `height`.
+
+    A steep slope rises as much as it falls; the border of a roof falls to the ground and rises to its ridge at most.
+    """
+    import cv2
+
+    window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+    fall = relief - cv2.erode(relief, window)
+    rise = cv2.dilate(relief, window) - relief
+    return np.asarray(fall - rise / 2 > height)
+
+
+def _beyond(unknown: _Mask, reach: float) -> _Mask:
+    """Return the unknown cells of gaps that a square reaching so many cells to all sides fits into."""
+    import cv2
+
+    # What lies around the grid is unknown, too.
+    window = np.ones((2 * round(reach) + 1,) * 2, np.uint8)
+    shrunk = cv2.erode(unknown.astype(np.uint8), window, borderValue=1)
+    return np.asarray((cv2.dilate(shrunk, window) > 0) & unknown)
+
+
+def _standing(removed: _Mask, walls: _Mask, beyond: _Mask) -> _Mask:
+    """Return the removed cells of the regions whose border is wall; where nothing is known beyond it is no border."""
+    import cv2
+
+    count, labels = cv2.connectedComponents(removed.astype(np.uint8), connectivity=4)
+    inner = cv2.erode((removed | beyond).astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1)
+    border = removed & (inner == 0)
+    length = np.bincount(labels[border], minlength=count)
+    walled = np.bincount(labels[border & walls], minlength=count)
+    stands = walled >= _WALLED * np.maximum(length, 1)
+    return np.asarray(removed & stands[labels])
+
+
+def _averaged(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    z: NDArray[np.float64],
+    grid: Grid,
+    ground: _Floats,
+    tolerance: float,
+) -> Elevation:
+    """Replace the lowest by the mean of the points within the tolerance of the ground: it is biased by the noise."""
+    surface = Elevation(ground, grid)
+    known = mean_above(x, y, z, surface, tolerance=tolerance)
+    if np.isnan(known).all():
+        return surface
+    return Elevation(ground + np.nan_to_num(fill_unknown(known)), grid)

@@ -1,0 +1,179 @@
+"""Points put on a grid without copies of them: where there are any, the lowest of each cell, the mean near a surface.
+
+Nouns
+-----
+lowest surface
+    Per cell the lowest point that is not isolated, metres; NaN without one.
+
+A cloud holds more points than its grid has cells, so what is kept beside it is counted in cells: nothing is sorted, and
+the only array of the points' size holds heights in four bytes each. Axis order of grids: (row, column), row 0
+northernmost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..geodata.raster import Elevation, Grid
+
+__all__ = ["coverage", "default_cell", "lowest_surface", "mean_above"]
+
+_Coordinates = NDArray[np.float64]
+
+#: Points in height within this many metres of a cell's lowest point support it, itself included; how many must, and
+#: which share of the points around.
+_SUPPORT_HEIGHT, _SUPPORT, _SUPPORT_SHARE = 1.0, 3, 0.05
+#: Points whose height above a surface is computed at a time.
+_CHUNK = 1 << 18
+
+
+@njit(cache=True, nogil=True)
+def coverage(x, y, west, north, side, rows, columns):  # type: ignore[no-untyped-def]
+    """Return which squares of a grid hold a point, shape (rows, columns), and how many points lie in any.
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (n,)
+        Metres; points that are not finite lie in none.
+    west, north, side : float
+        Upper left corner of the grid and side of a square, metres.
+    rows, columns : int
+    """
+    seen = np.zeros((rows, columns), dtype=np.bool_)
+    points = 0
+    for i in range(len(x)):
+        column, row = (x[i] - west) / side, (north - y[i]) / side
+        if 0 <= column < columns and 0 <= row < rows:
+            points += 1
+            seen[int(row), int(column)] = True
+    return seen, points
+
+
+def default_cell(x: _Coordinates, y: _Coordinates, extent: Sequence[float]) -> float:
+    """Return the cell size in metres at which an average covered cell holds two points, at least 1 m.
+
+    Cells of 4 m without points do not count as covered, so that water and a ragged border do not coarsen the grid.
+    """
+    coarse = Grid.covering(extent, 4.0)
+    seen, points = coverage(x, y, coarse.west, coarse.north, coarse.gsd, coarse.rows, coarse.columns)
+    if points == 0:
+        return 1.0
+    density = points / (np.count_nonzero(seen) * 16.0)
+    return max(1.0, math.ceil(10 * math.sqrt(2.0 / density)) / 10)
+
+
+def lowest_surface(x: _Coordinates, y: _Coordinates, z: _Coordinates, grid: Grid) -> NDArray[np.float32]:
+    """Return the lowest point of each cell that is not isolated, shape (rows, columns); NaN without one.
+
+    A lowest point is isolated when fewer than three points, or 5 % of the points, in its 5 x 5 cells lie within 1 m
+    of its height: a reflection from below the ground or a no-data height. It is passed over for the next lowest.
+    """
+    start = np.zeros(grid.rows * grid.columns + 1, dtype=np.int64)
+    frame = (grid.west, grid.north, grid.gsd, grid.rows, grid.columns)
+    _count(x, y, *frame, start)
+    np.cumsum(start, out=start)
+    heights = np.empty(start[-1], dtype=np.float32)
+    _group(x, y, z, *frame, start, heights)
+    return _lowest_supported(heights, start, grid.rows, grid.columns)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _cell_of(x, y, west, north, side, rows, columns):  # type: ignore[no-untyped-def]
+    """Return the flat cell of a place, -1 outside."""
+    row, column = (north - y) / side, (x - west) / side
+    return int(row) * columns + int(column) if 0 <= row < rows and 0 <= column < columns else -1
+
+
+@njit(cache=True, nogil=True)
+def _count(x, y, west, north, side, rows, columns, counts):  # type: ignore[no-untyped-def]
+    """Count the points of each cell, in the place after its own."""
+    for i in range(len(x)):
+        k = _cell_of(x[i], y[i], west, north, side, rows, columns)
+        if k >= 0:
+            counts[k + 1] += 1
+
+
+@njit(cache=True, nogil=True)
+def _group(x, y, z, west, north, side, rows, columns, start, heights):  # type: ignore[no-untyped-def]
+    """Write the heights cell by cell; afterwards as before, cell c begins at ``start[c]``."""
+    for i in range(len(x)):
+        k = _cell_of(x[i], y[i], west, north, side, rows, columns)
+        if k >= 0:
+            heights[start[k]] = z[i]
+            start[k] += 1
+    for k in range(rows * columns, 0, -1):
+        start[k] = start[k - 1]
+    start[0] = 0
+
+
+@njit(cache=True)
+def _lowest_supported(heights, start, rows, columns):  # type: ignore[no-untyped-def]
+    """Lowest supported height per cell; `heights` is grouped by cell, cell c holds ``start[c]:start[c + 1]``."""
+    lowest = np.full((rows, columns), np.nan, dtype=np.float32)
+    for row in range(rows):
+        for column in range(columns):
+            first, last = start[row * columns + column], start[row * columns + column + 1]
+            passed = -np.inf
+            while np.isnan(lowest[row, column]):
+                height = np.inf
+                for i in range(first, last):
+                    if passed < heights[i] < height:
+                        height = heights[i]
+                if height == np.inf:
+                    break
+                if _supported(heights, start, rows, columns, row, column, height):
+                    lowest[row, column] = height
+                passed = height
+    return lowest
+
+
+@njit(cache=True)
+def _supported(heights, start, rows, columns, row, column, height):  # type: ignore[no-untyped-def]
+    support, around = 0, 0
+    for r in range(max(row - 2, 0), min(row + 3, rows)):
+        first = start[r * columns + max(column - 2, 0)]
+        last = start[r * columns + min(column + 2, columns - 1) + 1]
+        around += last - first
+        for i in range(first, last):
+            if abs(heights[i] - height) < _SUPPORT_HEIGHT:
+                support += 1
+    return support >= max(_SUPPORT, _SUPPORT_SHARE * around)
+
+
+def mean_above(
+    x: _Coordinates, y: _Coordinates, z: _Coordinates, surface: Elevation, *, tolerance: float
+) -> NDArray[np.float32]:
+    """Return how high the points near a surface lie above it in the mean of each of its cells, metres; NaN without one.
+
+    Parameters
+    ----------
+    x, y, z : ndarray, shape (n,)
+        Metres.
+    surface : Elevation
+        Known everywhere.
+    tolerance : float
+        Points nearer to the surface than this, metres, are near.
+    """
+    grid = surface.grid
+    count, total = np.zeros(grid.rows * grid.columns, dtype=np.int32), np.zeros(grid.rows * grid.columns)
+    frame = (grid.west, grid.north, grid.gsd, grid.rows, grid.columns)
+    for first in range(0, len(x), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        _add_near(x[part], y[part], z[part] - surface.sample(x[part], y[part]), tolerance, *frame, count, total)
+    mean = np.full(grid.shape, np.nan, dtype=np.float32)
+    np.divide(total.reshape(grid.shape), count.reshape(grid.shape), out=mean, where=count.reshape(grid.shape) > 0)
+    return mean
+
+
+@njit(cache=True, nogil=True)
+def _add_near(x, y, above, tolerance, west, north, side, rows, columns, count, total):  # type: ignore[no-untyped-def]
+    for i in range(len(x)):
+        k = _cell_of(x[i], y[i], west, north, side, rows, columns)
+        if k >= 0 and abs(above[i]) < tolerance:
+            count[k] += 1
+            total[k] += above[i]

@@ -1,0 +1,1 @@
+"""Import of real scenes: one module for each layer."""

@@ -1,0 +1,118 @@
+"""Outlines of classified points: a reference derived from what somebody classified as building.
+
+The points of one class are put on cells, gaps between them are closed, and the regions are traced and simplified.
+Such outlines are as good as the classification and as the point spacing; whoever uses them says *derived*.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ..geodata.footprints import Footprints
+from ..geodata.points import PointCloud
+from ..geodata.raster import Grid
+
+__all__ = ["BUILDING_CLASS", "outlines_of_class"]
+
+#: How far an outline may move when it is simplified, in cells.
+_TOLERANCE = 1.5
+#: ASPRS LAS 1.4 R15, table 17.
+BUILDING_CLASS = 6
+
+
+def outlines_of_class(
+    points: PointCloud,
+    extent: tuple[float, float, float, float],
+    *,
+    code: int = BUILDING_CLASS,
+    cell: float | None = None,
+    minimum_area: float = 10.0,
+    crs: str | None = None,
+    source: str = "point cloud",
+) -> Footprints:
+    """Return the traced outlines of the points of one class.
+
+    Parameters
+    ----------
+    points : PointCloud
+        With classification.
+    extent : tuple of float
+        ``(xmin, ymin, xmax, ymax)``, metres.
+    code : int
+        ASPRS class; 6 is building.
+    cell : float, optional
+        Cell size in metres; by default the one at which a cell on a roof holds two points, from 0.25 m to 2 m.
+    minimum_area : float
+        Regions and holes smaller than this, m2, are dropped; holes below a quarter of it are filled.
+    crs : str, optional
+    source : str
+        File or files, for messages.
+
+    Raises
+    ------
+    InputError
+        No classification or no point of this class.
+    """
+    from rasterio import Affine, features
+    from scipy import ndimage
+
+    if points.classification is None:
+        raise InputError(f"{source}: the points are not classified, so no reference can be derived from class {code}")
+    chosen = points.classification == code
+    if not chosen.any():
+        classes = ", ".join(map(str, np.unique(points.classification)))
+        raise InputError(
+            f"{source}: no point is of class {code} (there are {classes}): give footprints with --reference"
+        )
+    x, y = points.x[chosen], points.y[chosen]
+    grid = _padded(Grid.covering(extent, cell if cell is not None else _cell(x, y, extent)))
+    index, inside = grid.cells(x, y)
+    mask = np.bincount(index[inside], minlength=grid.rows * grid.columns).reshape(grid.shape) > 0
+    disc = ndimage.generate_binary_structure(2, 1)
+    mask = ndimage.binary_closing(mask, disc)
+    mask = ndimage.binary_opening(mask, np.ones((3, 3), dtype=bool))
+    traced = features.shapes(mask.astype(np.uint8), mask=mask, connectivity=4, transform=Affine(*grid.transform))
+    polygons = [shapely.geometry.shape(geometry) for geometry, _ in traced]
+    outlines = np.array([_simplified(polygon, grid.gsd, minimum_area / 4) for polygon in polygons], dtype=object)
+    if len(outlines):
+        outlines = outlines[shapely.area(outlines) >= minimum_area]
+    # From north to south, west to east, so that the numbering reads like a page.
+    bounds = shapely.bounds(outlines).reshape(-1, 4)
+    return Footprints.of(outlines[np.lexsort((bounds[:, 0], -bounds[:, 3]))], crs=crs, source=source)
+
+
+def _cell(x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, float, float, float]) -> float:
+    """Return the cell size that holds two points where a typical point lies, by the counts of cells of 2 m."""
+    coarse = Grid.covering(extent, 2.0)
+    index, inside = coarse.cells(x, y)
+    index = index[inside]
+    density = float(np.median(np.bincount(index)[index])) / 4.0 if len(index) else 1.0
+    return float(np.clip(np.ceil(20 * np.sqrt(2.0 / density)) / 20, 0.25, 2.0))
+
+
+def _padded(grid: Grid) -> Grid:
+    """Return the grid with three more cells on each side, so that closing and opening see no border."""
+    return Grid(grid.west - 3 * grid.gsd, grid.north + 3 * grid.gsd, grid.gsd, grid.rows + 6, grid.columns + 6)
+
+
+def _simplified(polygon: shapely.Polygon, cell: float, smallest_hole: float) -> shapely.Polygon:
+    """Return the polygon without stair steps (Douglas-Peucker) and without tiny holes.
+
+    It runs through the midpoints of the cell edges: those of a slanting wall lie along it, the corners beside it.
+    """
+    rings = [_edge_midpoints(ring, cell) for ring in (polygon.exterior, *polygon.interiors)]
+    holes = [ring for ring in rings[1:] if shapely.area(shapely.Polygon(ring)) >= smallest_hole]
+    smooth = shapely.make_valid(shapely.Polygon(rings[0], holes))
+    parts = shapely.get_parts(shapely.get_parts(shapely.simplify(smooth, _TOLERANCE * cell)))
+    return max(
+        (part for part in parts if part.geom_type == "Polygon"), key=lambda part: part.area, default=shapely.Polygon()
+    )
+
+
+def _edge_midpoints(ring: shapely.LinearRing, cell: float) -> NDArray[np.float64]:
+    corners = shapely.get_coordinates(shapely.segmentize(ring, 1.001 * cell))
+    middles = (corners[:-1] + corners[1:]) / 2
+    return np.concatenate([middles, middles[:1]])

@@ -1,0 +1,82 @@
+"""An orthoimage from coloured points, where there is no other.
+
+Each cell takes the mean colour of the first returns in it; cells without one take the nearest within `REACH` cells;
+beyond that the image has no data.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ..geodata.points import PointCloud
+from ..geodata.raster import Grid, Image
+
+__all__ = ["REACH", "image_from_points"]
+
+#: How far a colour is carried into cells without points, in cells.
+REACH = 3
+#: Cell sizes to choose from, metres.
+_SIZES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
+
+
+def image_from_points(
+    points: PointCloud,
+    extent: tuple[float, float, float, float],
+    *,
+    gsd: float | None = None,
+    source: str = "point cloud",
+) -> Image:
+    """Return the colours of points as an image of 8 bits.
+
+    Parameters
+    ----------
+    points : PointCloud
+        With colour.
+    extent : tuple of float
+        ``(xmin, ymin, xmax, ymax)``, metres.
+    gsd : float, optional
+        Cell size in metres; by default the smallest of a list, 0.1 m to 1 m, at which a cell holds a point on average.
+    source : str
+        File or files, for messages.
+
+    Raises
+    ------
+    InputError
+        The points carry no colour.
+    """
+    from scipy import ndimage
+
+    if points.colour is None:
+        raise InputError(f"{source}: the points carry no colour, so no orthoimage can be made of them; give --ortho")
+    x, y, colour = points.x, points.y, points.colour
+    if points.return_number is not None:
+        first = points.return_number == 1
+        x, y, colour = x[first], y[first], colour[first]
+    grid = Grid.covering(extent, gsd if gsd is not None else _size(x, y, extent))
+    index, inside = grid.cells(x, y)
+    index, colour = index[inside], colour[inside]
+    size = grid.rows * grid.columns
+    count = np.bincount(index, minlength=size)
+    values = np.empty((colour.shape[1], *grid.shape), dtype=np.uint8)
+    for band in range(colour.shape[1]):
+        total = np.bincount(index, weights=colour[:, band], minlength=size)
+        mean = total / np.maximum(count, 1)
+        values[band] = np.round(mean / 257.0).reshape(grid.shape)
+    known = (count > 0).reshape(grid.shape)
+    distance, nearest = ndimage.distance_transform_edt(~known, return_indices=True)
+    values = values[:, nearest[0], nearest[1]]
+    valid = np.asarray(distance <= REACH)
+    values[:, ~valid] = 0
+    names = ("red", "green", "blue", "nir")[: colour.shape[1]]
+    return Image(values, names, grid, None if valid.all() else valid)
+
+
+def _size(x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, float, float, float]) -> float:
+    """Return the cell size for the point density where there are points."""
+    coarse = Grid.covering(extent, 4.0)
+    index, inside = coarse.cells(x, y)
+    covered = int(np.count_nonzero(np.bincount(index[inside], minlength=1)))
+    spacing = 4.0 * float(np.sqrt(max(covered, 1) / max(int(inside.sum()), 1)))
+    return next((size for size in _SIZES if size >= 0.95 * spacing), _SIZES[-1])

@@ -1,0 +1,138 @@
+"""Reports filled from a store, and the commands that write them."""
+
+import re
+
+import pytest
+from command_line import roofbench
+
+import roofbench as rb
+from roofbench.benchmark.analysis.report_contents import fill_report, newest_runs
+from roofbench.benchmark.store.writer import Store
+from roofbench.reports.html_report import html_report
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("store")
+    scenes = ["hamlet[seed=1]", "hamlet[seed=2]"]
+    rb.run(scenes=scenes, detectors=["ndsm", "ndsm[height=4]", "ndsm[height=6]"], store=place / "runs.sqlite")
+    return place
+
+
+@pytest.fixture(scope="module")
+def filled(folder):
+    with Store(folder / "runs.sqlite") as opened:
+        return fill_report(opened, newest_runs(opened), title="two hamlets")
+
+
+def test_every_scene_is_drawn_with_picture_and_every_detector(filled):
+    assert [view.name for view in filled.scenes] == ["hamlet-1", "hamlet-2"]
+    for view in filled.scenes:
+        assert view.picture is not None
+        assert {overlay.label for overlay in view.overlays} == {"ndsm", "ndsm[height=4]", "ndsm[height=6]"}
+        for overlay in view.overlays:
+            assert len(overlay.polygons) == len(overlay.detections.verdicts)
+            assert len(view.polygons) == len(overlay.references.verdicts)
+    assert filled.sampling == ()
+
+
+def test_counts_by_size_are_those_of_the_leaderboard(filled):
+    curve = next(curve for curve in filled.sizes if curve.label == "ndsm")
+    entry = next(e for e in filled.boards[0].entries if e.label == "ndsm" and e.pooling == "pooled")
+    found = sum(each.right for each in curve.found) / sum(each.count for each in curve.found)
+    correct = sum(each.right for each in curve.correct) / sum(each.count for each in curve.correct)
+    assert found == pytest.approx(entry.cells["object.completeness"].value)
+    assert correct == pytest.approx(entry.cells["object.correctness"].value)
+
+
+def test_the_worst_objects_are_wrong_by_what_their_verdict_says(filled):
+    for error in filled.errors:
+        view = filled.scenes[error.scene]
+        overlay = view.overlays[error.overlay]
+        if error.side == "reference":
+            assert overlay.references.verdicts[error.position] == "FN"
+            assert error.wrong == pytest.approx(view.polygons[error.position].area)
+        elif overlay.detections.verdicts[error.position] == "TP":
+            own = overlay.polygons[error.position]
+            partner = view.polygons[view.ids.index(overlay.detections.partners[error.position])]
+            assert error.wrong == pytest.approx(own.symmetric_difference(partner).area)
+        else:
+            assert error.wrong == pytest.approx(overlay.polygons[error.position].area)
+
+
+def test_runs_that_differ_in_one_parameter_make_a_sensitivity_line(filled):
+    quality = next(line for line in filled.sensitivities if line.index.key == "object.quality")
+    assert (quality.detector, quality.axis, quality.unit) == ("ndsm", "height", "m")
+    assert [point.value for point in quality.points] == [quality.default, 4, 6]
+    assert all(point.scenes == 2 for point in quality.points)
+    entries = {e.label: e for e in filled.boards[0].entries if e.pooling == "mean"}
+    means = [entries[label].cells["object.quality"].value for label in ("ndsm", "ndsm[height=4]", "ndsm[height=6]")]
+    assert [point.mean for point in quality.points] == pytest.approx(means)
+
+
+def test_only_the_newest_run_of_a_detector_counts(folder):
+    with Store(folder / "runs.sqlite") as opened:
+        rows = newest_runs(opened, detector="ndsm", scene="*-1")
+        assert [(row.label, row.scene) for row in rows] == [("ndsm", "hamlet-1")]
+
+
+def test_the_page_is_the_same_for_the_same_store(filled):
+    assert html_report(filled) == html_report(filled)
+
+
+def test_report_writes_one_file_and_replaces_nothing_unasked(folder):
+    answer = roofbench("report", "runs.sqlite", "-o", "report.html", folder=folder)
+    assert "2 scenes drawn" in answer.stderr
+    page = (folder / "report.html").read_text("utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    assert not re.search(r"(?:src|href)=\"(?!data:|#)", page)
+    refused = roofbench("report", "runs.sqlite", "-o", "report.html", folder=folder, expect=2)
+    assert "--overwrite" in refused.stderr
+    roofbench("report", "runs.sqlite", "-o", "report.html", "--overwrite", folder=folder)
+
+
+def test_run_writes_the_report_beside_its_leaderboard(folder):
+    roofbench("run", "hamlet", "-d", "ndsm", "--store", "run.sqlite", "-o", "out", folder=folder)
+    written = {path.name for path in (folder / "out").iterdir()}
+    assert written == {"leaderboard.csv", "leaderboard.md", "report.html"}
+    assert "<h1" in (folder / "out" / "report.html").read_text("utf-8")
+
+
+def test_a_store_compared_with_itself_is_the_same(folder):
+    answer = roofbench("report", "compare", "runs.sqlite", "runs.sqlite", "-o", "same.md", folder=folder)
+    lines = [line for line in answer.stdout.splitlines() if line.startswith("ndsm")]
+    assert len(lines) == 3 * 15
+    assert all(line.endswith("same") for line in lines)
+    assert "| same" in (folder / "same.md").read_text("utf-8")
+
+
+def test_stores_without_common_scenes_are_not_comparable(folder):
+    rb.run(scenes=["hamlet[seed=3]"], detectors=["ndsm"], store=folder / "other.sqlite")
+    answer = roofbench("report", "compare", "runs.sqlite", "other.sqlite", folder=folder, expect=4)
+    assert "only in B: 1 pairs" in answer.stdout
+
+
+def test_plots_are_written(folder):
+    roofbench("plot", "scene", "hamlet-1", "--store", "runs.sqlite", "-o", "scene.png", folder=folder)
+    roofbench("plot", "sweep", "--store", "runs.sqlite", "-o", "sweep.svg", folder=folder)
+    assert (folder / "scene.png").read_bytes().startswith(b"\x89PNG")
+    assert "height [m]" in (folder / "sweep.svg").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("report", "nothing.sqlite", "-o", "x.html"), "no such results store"),
+        (("report", "compare", "runs.sqlite"), "name one results store"),
+        (("plot", "scene", "castle", "-o", "x.png", "--store", "runs.sqlite"), "no run on 'castle'"),
+        (("plot", "scene", "hamlet-*", "-o", "x.png", "--store", "runs.sqlite"), "several scenes match"),
+        (("plot", "sweep", "missing.csv", "-o", "x.png"), "no such sweep table"),
+        (("plot", "gate", "runs.sqlite", "-o", "x.png"), "no result of the gate"),
+        (("plot", "sweep", "--axis", "width", "-o", "x.png", "--store", "runs.sqlite"), "no axis 'width'"),
+    ],
+)
+def test_a_mistake_gets_one_sentence(folder, arguments, told):
+    answer = roofbench(*arguments, folder=folder, expect=2)
+    assert told in answer.stderr
+    assert len(answer.stderr.strip().splitlines()) == 1
+    assert not (folder / "x.png").exists()

@@ -1,0 +1,109 @@
+"""Runs on real Dask clusters: one in this process, and one of separate scheduler and worker processes."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+
+from roofbench.benchmark.execution.isolation import Limits, close_isolated
+from roofbench.benchmark.execution.runner import Execution, run_plan
+from roofbench.benchmark.identity.recipes import SceneRecipe
+from roofbench.benchmark.plan import make_plan
+from roofbench.benchmark.store.writer import Store
+from roofbench.benchmark.suite import Entrant, Suite
+from roofbench.core.errors import InputError
+from roofbench.detectors.registry import make_detector
+from roofbench.evaluators.registry import make_evaluator
+
+distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'roofbench[dask]'")
+pytestmark = pytest.mark.filterwarnings("ignore")  # warnings of Dask and Tornado are theirs
+
+
+@pytest.fixture
+def suite(misbehaving):
+    scenes = tuple(SceneRecipe.of_preset("hamlet", seed=seed) for seed in (1, 2))
+    good, failing = make_detector(misbehaving), make_detector(misbehaving, {"mode": "leaves", "only_on": "hamlet-2"})
+    return Suite("s", scenes, (Entrant(good, (0, 1, 2)), Entrant(failing)), (make_evaluator("threshold-free"),))
+
+
+def run(suite, path, execution):
+    with Store(path) as store:
+        plan = make_plan(suite, store)
+        result = run_plan(plan, store, execution=execution)
+        values = store.index_values([row.id for row in result.ok], plan.judges[0].key)
+        return {row.key: (row.status, row.reason, row.detected, values.get(row.id)) for row in result.rows}
+
+
+def test_a_local_cluster_gives_the_same_results(suite, tmp_path):
+    here = run(suite, tmp_path / "here.sqlite", Execution(jobs=1))
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        there = run(suite, tmp_path / "there.sqlite", Execution(scheduler=cluster.scheduler_address))
+    close_isolated()  # those of the workers, which lived in this process
+    assert there == here
+    assert sorted(status for status, *_ in there.values()) == ["failed"] + ["ok"] * 7
+
+
+def test_limits_hold_on_a_cluster(suite, tmp_path, misbehaving):
+    hanging = replace(suite, entrants=(Entrant(make_detector(misbehaving, {"mode": "hangs"})),))
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        execution = Execution(scheduler=cluster.scheduler_address, limits=Limits(seconds=2))
+        found = run(hanging, tmp_path / "a.sqlite", execution)
+    close_isolated()
+    assert {reason for _, reason, *_ in found.values()} == {"time limit of 2 s passed"}
+
+
+def test_a_worker_killed_in_mid_run_does_not_stop_the_sweep(suite, tmp_path, misbehaving):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "DASK_DISTRIBUTED__WORKER__DAEMON": "False"}
+
+    def start(*words):
+        command = [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]]
+        return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    worker = ("dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", tmp_path)
+    processes = [start("dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")]
+    try:
+        processes += [start(*map(str, worker)) for _ in range(2)]
+        with distributed.Client(address, timeout="30s") as client:
+            client.wait_for_workers(2, timeout=60)
+        slow = replace(suite, entrants=(Entrant(make_detector(misbehaving, {"seconds": 0.5}), tuple(range(6))),))
+        victim = processes[1]
+        killed = []
+
+        def kill_one(run, outcome):
+            if not killed:
+                victim.send_signal(signal.SIGKILL)
+                killed.append(time.monotonic())
+
+        with Store(tmp_path / "a.sqlite") as store:
+            plan = make_plan(slow, store)
+            result = run_plan(plan, store, execution=Execution(scheduler=address), progress=kill_one)
+        assert killed
+        assert victim.wait(timeout=30) == -signal.SIGKILL
+        assert [row.status for row in result.rows] == ["ok"] * 12
+        here = run(slow, tmp_path / "here.sqlite", Execution(jobs=1))
+        assert {row.key: row.detected for row in result.rows} == {key: found[2] for key, found in here.items()}
+    finally:
+        for process in reversed(processes):
+            process.kill()
+            process.wait()
+
+
+def test_a_scheduler_that_does_not_answer_is_one_sentence(suite, tmp_path, monkeypatch):
+    from roofbench.benchmark.execution import executors
+
+    monkeypatch.setattr(executors, "_CONNECT_SECONDS", 1)
+    with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1: "):
+        run(suite, tmp_path / "a.sqlite", Execution(scheduler="tcp://127.0.0.1:1"))

@@ -1,0 +1,228 @@
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from roofbench.benchmark.execution.runner import score_stored
+from roofbench.benchmark.execution.tasks import Outcome
+from roofbench.benchmark.execution.worker import execute
+from roofbench.benchmark.identity.keys import SourceClosure
+from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
+from roofbench.benchmark.plan import Judge
+from roofbench.benchmark.store.records import RunIdentity
+from roofbench.benchmark.store.schema import MIGRATIONS, VERSION
+from roofbench.benchmark.store.writer import Store
+from roofbench.core.errors import InputError, RoofbenchError, UnknownNameError
+from roofbench.evaluators.registry import make_evaluator
+from roofbench.scenes.builtin import hamlet
+
+
+@pytest.fixture
+def store(tmp_path):
+    with Store(tmp_path / "runs.sqlite") as opened:
+        yield opened
+
+
+@pytest.fixture
+def judge():
+    return Judge.of(make_evaluator("threshold-free"))
+
+
+def identity(seed=0, **parameters):
+    recipe = SceneRecipe.of_preset("hamlet", seed=0)
+    return RunIdentity(
+        detector=PluginRecipe("misbehaving.py:Misbehaving", parameters),
+        label="misbehaving",
+        fingerprint="",
+        code=SourceClosure({"m": "1"}, {"numpy": "2"}),
+        scene=recipe,
+        scene_key=recipe.key,
+        seed=seed,
+    )
+
+
+@pytest.fixture
+def outcome(task_of, judge):
+    task = replace(task_of(), evaluators=(judge.recipe,), describe_scene=True)
+    return execute(task)
+
+
+def test_an_outcome_survives_the_way_between_processes(outcome):
+    assert Outcome.from_bytes(outcome.to_bytes()) == outcome
+
+
+def test_raw_detections_reference_and_indices_come_back_as_they_were(store, outcome, judge):
+    run_id = store.record(identity(), outcome, version="1")
+    scene, drawn = store.scene(store.run(run_id).scene_id), hamlet(0)
+    assert shapely.equals_identical(scene.reference.polygons, drawn.reference.polygons).all()
+    assert np.array_equal(scene.reference.building_codes, drawn.reference.building_codes)
+    assert scene.grid == drawn.image.grid
+    assert scene.content_hash == drawn.content_hash
+    detected = store.detections(run_id)
+    assert [shapely.to_wkb(polygon) for polygon in detected.polygons] == list(outcome.detections)
+    rebuilt = store.evaluation(run_id, judge.evaluator, judge.key)
+    direct = judge.evaluator.evaluate(detected, scene.reference, grid=scene.grid)
+    assert dict(rebuilt.values) == dict(direct.values)
+    verdicts = store.verdicts(run_id, judge.key)
+    assert [row["reason"] for row in verdicts["reference"]] == list(direct.verdicts.references["reason"])
+
+
+def test_a_good_result_is_not_replaced_unless_asked(store, outcome):
+    first = store.record(identity(), outcome, version="1")
+    assert store.record(identity(), outcome, version="2") == first
+    assert store.run(first).version == "1"
+    second = store.record(identity(), outcome, version="3", replace=True)
+    assert [row.version for row in store.runs()] == ["3"]
+    assert len(store.detections(second)) == len(outcome.detections)
+
+
+def test_a_failure_is_a_row_that_a_later_result_replaces(store, outcome):
+    failed = Outcome(status="failed", reason="no", traceback="Traceback")
+    store.record(identity(), failed, version="1")
+    assert store.statuses([identity().key])[identity().key][1:] == ("failed", "no")
+    store.record(identity(), outcome, version="1")
+    assert [row.status for row in store.runs()] == ["ok"]
+
+
+def test_every_part_of_the_identity_changes_the_key():
+    base = identity()
+    others = [
+        identity(seed=1),
+        identity(side=9),
+        replace(base, fingerprint="x"),
+        replace(base, scene_key="other"),
+        replace(base, code=SourceClosure({"m": "2"}, {"numpy": "2"})),
+        replace(base, code=SourceClosure({"m": "1"}, {"numpy": "3"})),
+    ]
+    assert len({base.key, *(other.key for other in others)}) == 7
+    assert replace(base, label="other name").key == base.key
+
+
+def test_a_new_evaluator_uses_the_stored_detections(store, outcome):
+    run_id = store.record(identity(), outcome, version="1")
+    other = Judge.of(make_evaluator("threshold-free[matching=overlap]"))
+    assert score_stored(store, run_id, (other,)) == 1
+    assert store.evaluation(run_id, other.evaluator, other.key) is not None
+    assert [recipe.parameters["matching"] for _, recipe in store.evaluators()] == ["nearest", "overlap"]
+
+
+def test_runs_are_found_by_number_key_and_pattern(store, outcome):
+    run_id = store.record(identity(), outcome, version="1")
+    store.record(identity(seed=1), Outcome(status="failed", reason="no"), version="1")
+    assert store.run(run_id).id == store.run(identity().key[:8]).id == run_id
+    assert [row.seed for row in store.runs(status="failed")] == [1]
+    assert len(store.runs(detector="mis*", scene="hamlet-?")) == 2
+    assert store.runs(scene="knox*") == []
+    with pytest.raises(UnknownNameError, match="no run called '99'"):
+        store.run(99)
+
+
+def test_a_file_that_is_no_store_or_a_newer_one_is_refused(tmp_path):
+    (tmp_path / "text.sqlite").write_text("no database at all, but long enough to be taken for one" * 30)
+    with pytest.raises(RoofbenchError, match="is no results store"):
+        Store(tmp_path / "text.sqlite")
+    other = sqlite3.connect(tmp_path / "other.sqlite")
+    other.execute("CREATE TABLE things (id)")
+    other.close()
+    with pytest.raises(InputError, match="a database of something else"):
+        Store(tmp_path / "other.sqlite")
+    other = sqlite3.connect(tmp_path / "other.sqlite")
+    other.execute("PRAGMA user_version = 10400")  # as GeoPackages have it
+    other.close()
+    with pytest.raises(InputError, match="a database of something else"):
+        Store(tmp_path / "other.sqlite")
+    Store(tmp_path / "newer.sqlite").close()
+    newer = sqlite3.connect(tmp_path / "newer.sqlite")
+    newer.execute(f"PRAGMA user_version = {VERSION + 1}")
+    newer.close()
+    with pytest.raises(InputError, match="newer roofbench"):
+        Store(tmp_path / "newer.sqlite")
+    with pytest.raises(InputError, match="no such results store"):
+        Store(tmp_path / "absent.sqlite", must_exist=True)
+
+
+def test_a_store_of_the_first_version_is_migrated_with_what_it_holds(tmp_path, outcome, judge):
+    path = tmp_path / "old.sqlite"
+    with Store(path) as store:
+        run_id = store.record(identity(), outcome, version="1")
+    old = sqlite3.connect(path)
+    old.executescript("ALTER TABLE scenes DROP COLUMN point_count; DROP TABLE scene_pictures; PRAGMA user_version = 1")
+    old.close()
+    with Store(path) as store:
+        assert store.count_runs() == 1
+        scene = store.scene(store.run(run_id).scene_id)
+        assert scene.point_count is None
+        assert store.scene_picture(scene.id) is None
+        assert len(store.detections(run_id)) == len(outcome.detections)
+        assert store.index_values([run_id], judge.key)[run_id]
+        store.record(identity(seed=1), outcome, version="2")
+    db = sqlite3.connect(path)
+    assert db.execute("PRAGMA user_version").fetchone() == (VERSION,)
+    db.close()
+
+
+def test_every_migration_leads_to_the_schema_of_a_new_store(tmp_path):
+    def schema(path):
+        db = sqlite3.connect(path)
+        columns = {
+            (table, *column[1:3])
+            for (table,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
+            for column in db.execute(f"PRAGMA table_info({table})").fetchall()
+        }
+        db.close()
+        return columns
+
+    Store(tmp_path / "new.sqlite").close()
+    first = sqlite3.connect(tmp_path / "first.sqlite")
+    first.executescript(MIGRATIONS[0] + "PRAGMA user_version = 1")
+    first.close()
+    Store(tmp_path / "first.sqlite").close()
+    assert schema(tmp_path / "first.sqlite") == schema(tmp_path / "new.sqlite")
+
+
+WRITE = """
+import sys
+from roofbench.benchmark.store.writer import Store
+from roofbench.benchmark.execution.tasks import Outcome
+sys.path.insert(0, sys.argv[3])
+from test_store import identity
+with Store(sys.argv[1]) as store:
+    for seed in range(int(sys.argv[2]), int(sys.argv[2]) + 60):
+        store.record(identity(seed=seed), Outcome(status="failed", reason="no"), version="1")
+"""
+
+
+def test_two_processes_write_to_one_store_at_once(tmp_path):
+    import os
+    from pathlib import Path
+
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    path = tmp_path / "shared.sqlite"
+    writers = [
+        subprocess.Popen(
+            [sys.executable, "-c", WRITE, str(path), str(start), str(Path(__file__).parent)], env=environment
+        )
+        for start in (0, 30)
+    ]
+    assert [writer.wait() for writer in writers] == [0, 0]
+    with Store(path) as store:
+        assert sorted(row.seed for row in store.runs()) == list(range(90))
+
+
+@pytest.mark.parametrize("name", ["runs.sqlite", "what? 50% #1.sqlite"])
+def test_a_store_in_a_folder_that_cannot_be_written_is_read(tmp_path, monkeypatch, name):
+    from roofbench.benchmark.store import database
+
+    Store(tmp_path / name).close()
+    monkeypatch.setattr(database.os, "access", lambda *_: False)
+    with Store(tmp_path / name, must_exist=True) as store:
+        assert store.count_runs() == 0
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+    db = database.connect(tmp_path / name)
+    with pytest.raises(sqlite3.OperationalError, match="readonly"):
+        db.execute("CREATE TABLE more (id)")
+    db.close()

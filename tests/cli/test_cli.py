@@ -1,0 +1,293 @@
+"""The commands on runs, called as the command line calls them, but in this process."""
+
+import json
+
+import numpy as np
+import pytest
+import shapely
+from typer.testing import CliRunner
+
+import roofbench as rb
+from roofbench.cli.main import app
+from roofbench.scenes.builtin import hamlet
+
+
+@pytest.fixture
+def cli(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words, code=0):
+        result = CliRunner().invoke(app, [str(word) for word in words])
+        if isinstance(result.exception, rb.RoofbenchError):
+            assert code == 2, result.exception
+            return str(result.exception)
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        assert result.exit_code == code, result.output
+        return result
+
+    return call
+
+
+def test_run_prints_a_leaderboard_and_writes_files(cli, misbehaving, tmp_path):
+    result = cli("run", "hamlet[seed=1]", "-d", misbehaving, "-j", 0, "-o", "out")
+    assert "misbehaving" in result.stdout
+    assert "1 runs done" in result.stderr
+    assert (tmp_path / "out" / "leaderboard.csv").read_text().count("\n") == 3
+    assert "| rank" in (tmp_path / "out" / "leaderboard.md").read_text().replace("|   rank", "| rank")
+    again = cli("run", "hamlet[seed=1]", "-d", misbehaving, "-j", 0)
+    assert "0 runs done, 1 stored before" in again.stderr
+    assert again.stdout == result.stdout
+
+
+def test_a_failing_detector_is_exit_code_3_with_reason_and_command(cli, misbehaving):
+    result = cli("run", "hamlet", "-d", f"{misbehaving}[mode=leaves]", "-d", misbehaving, code=3)
+    assert "failed misbehaving[mode=leaves] on hamlet-0, seed 0: the worker process left" in result.stderr
+    assert "repeat: roofbench detect" in result.stderr
+    assert "misbehaving" in result.stdout
+
+
+def test_nothing_measured_is_exit_code_4(cli, misbehaving, tmp_path):
+    scene = rb.Scene("bare", (0, 0, 200, 200), points=rb.PointCloud(*np.zeros((3, 4))))
+    rb.save_scene(scene, tmp_path / "bare")
+    result = cli("run", "bare", "-d", misbehaving, "-j", 0, code=4)
+    assert "bare has no reference and is left out" in result.stdout
+
+
+def test_a_dry_run_lists_what_would_run_and_why_the_rest_is_stored(cli, misbehaving):
+    cli("run", "hamlet[seed=1]", "-d", misbehaving, "-j", 0)
+    listed = cli("run", "hamlet[seed=1]", "hamlet[seed=2]", "-d", misbehaving, "--dry-run").stdout
+    assert "stored   misbehaving  hamlet-1  seed 0: stored as run 1" in listed
+    assert "run      misbehaving  hamlet-2  seed 0: not run yet" in listed
+    assert "2 runs: 1 to run, 0 to evaluate, 1 left as stored" in listed
+
+
+def test_resume_needs_no_suite(cli, misbehaving):
+    assert "no such results store" in cli("run", "--resume", code=2)
+    cli("run", "hamlet[seed=1]", "-d", f"{misbehaving}[side=7]", "-j", 0)
+    assert "misbehaving[side=7]" in cli("run", "--resume", "-j", 0).stdout
+
+
+def test_ls_filters_and_tells_reasons(cli, misbehaving):
+    cli("run", "hamlet", "-d", f"{misbehaving}[mode=raises]", "-d", misbehaving, "-j", 0, code=3)
+    assert "ZeroDivisionError: no houses at all" in cli("ls").stdout
+    (row,) = json.loads(cli("ls", "--status", "ok", "-f", "json").stdout)
+    assert (row["label"], row["detected"]) == ("misbehaving", 25)
+    assert cli("ls", "-d", "misbehaving", "-f", "csv").stdout.count("\n") == 2
+    assert "0 of 2 runs" in cli("ls", "--scene", "knox*").stdout
+
+
+def test_why_says_what_a_run_depends_on(cli, misbehaving):
+    cli("run", "hamlet", "-d", f"{misbehaving}[mode=raises]", "-d", misbehaving, "-j", 0, code=3)
+    failed = cli("why", 1).stdout
+    assert "ZeroDivisionError: no houses at all" in failed
+    assert "Traceback" in failed
+    assert "failures are tried again" in failed
+    assert "Nothing that it depends on has changed: it would not be run again." in cli("why", 2).stdout
+    assert "no run called '77'" in cli("why", 77, code=2)
+
+
+def test_score_judges_stored_detections_anew(cli, misbehaving):
+    cli("run", "hamlet", "-d", misbehaving, "-j", 0)
+    assert "matching overlap" in cli("score", "-e", "threshold-free[matching=overlap]").stdout
+
+
+def test_export_writes_verdict_layers(cli, misbehaving, tmp_path):
+    cli("run", "hamlet", "-d", misbehaving, "-d", f"{misbehaving}[mode=raises]", "-j", 0, code=3)
+    cli("export", 1, "-o", "run.gpkg")
+    layer = rb.read_footprints("run.gpkg|layername=references")
+    assert len(layer) == len(hamlet(0).reference)
+    assert {"verdict", "reason"} <= set(layer.attributes)
+    assert "has no footprints to export" in cli("export", 2, "-o", "other.gpkg", code=2)
+    assert "exists already" in cli("export", 1, "-o", "run.gpkg", code=2)
+
+
+def test_detect_writes_what_a_run_stores(cli, misbehaving):
+    cli("detect", misbehaving, "hamlet[seed=2]", "-o", "out.gpkg", "-p", "side=7", "--seed", 3)
+    written = rb.read_footprints("out.gpkg")
+    here = rb.detect(hamlet(2), misbehaving, side=7, seed=3)
+    assert shapely.equals_exact(written.polygons, here.polygons, 1e-9).all()
+    assert "exists already" in cli("detect", misbehaving, "hamlet", "-o", "out.gpkg", code=2)
+    assert "shows no intermediate steps" in cli("detect", misbehaving, "hamlet", "--steps", "steps", code=2)
+    assert "name what to write" in cli("detect", misbehaving, "hamlet", code=2)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("run", "nosuch.toml"), "nosuch.toml: no such suite file"),
+        (("run", "nosuch"), "is no scene folder and no preset"),
+        (("run", "hamlet", "-d", "ndms"), "did you mean 'ndsm'"),
+        (("run", "hamlet", "--memory-limit", "much"), "--memory-limit must be a size"),
+        (("run", "hamlet", "-j", 0, "--time-limit", 3), "limits need a worker process"),
+        (("run", "hamlet", "--rank-by", "quality"), "has no index 'quality'"),
+        (("run", "hamlet", "--store", "no/where.sqlite"), "there is no folder no"),
+        (("run", "hamlet", "--scenes", "x*"), "no scene of 'scenes' matches 'x*'"),
+        (("run", "hamlet", "--plugin", "absent.py"), "absent.py: no such file"),
+        (("ls",), "no such results store"),
+        (("check-plugin", "ndms"), "did you mean 'ndsm'"),
+        (("check-plugin", "absent.py"), "absent.py: no such file"),
+        (("plot", "gate", "empty.json", "-o", "x.png"), "it has no 'baseline'"),
+        (("gate", "empty.json"), "it has no 'format'"),
+    ],
+)
+def test_a_wrong_word_is_one_sentence_and_exit_code_2(cli, words, message, tmp_path):
+    (tmp_path / "empty.json").write_text("{}")
+    told = cli(*words, code=2)
+    assert message in told
+    assert "\n" not in told
+
+
+def test_check_plugin_accepts_an_honest_detector_and_names_broken_rules(cli, misbehaving, tmp_path):
+    assert "10 of 10 rules kept" in cli("check-plugin", misbehaving).stdout
+    (tmp_path / "bad.py").write_text(
+        "from dataclasses import dataclass\nimport numpy as np\nimport roofbench as rb\n\n"
+        "@dataclass(frozen=True, kw_only=True)\nclass Bad(rb.Detector):\n"
+        '    """Draws from numpy\'s own stream and changes the scene."""\n\n    name = "bad"\n'
+        "    limit: float = rb.parameter(1.0)\n\n"
+        "    def detect(self, scene, rng):\n"
+        "        scene.points.z[:] += 1\n"
+        "        x, y = scene.extent[:2] + np.random.default_rng().random(2)\n"
+        "        return rb.Footprints.from_rectangles([[(x, y), (x + 9, y), (x + 9, y + 9), (x, y + 9)]])\n"
+    )
+    told = cli("check-plugin", "bad.py", code=3).stdout
+    assert "BROKEN  the same seed gives the same footprints: draw random numbers from rng only" in told
+    assert "BROKEN  leaves the scene as it was" in told
+    assert "BROKEN  documents its parameters: no doc= for limit" in told
+
+
+def test_check_plugin_accepts_the_built_in_evaluator(cli):
+    assert "rules kept" in cli("check-plugin", "threshold-free").stdout
+
+
+BAD_PLUGINS = """
+import os
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+
+import roofbench as rb
+
+print("told while it is imported")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leaves(rb.Detector):
+    \"\"\"Leaves the interpreter.\"\"\"
+
+    name = "leaves"
+
+    def detect(self, scene, rng):
+        print("told while it runs")
+        sys.exit(0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crashes(Leaves):
+    \"\"\"Takes its process with it.\"\"\"
+
+    name = "crashes"
+
+    def detect(self, scene, rng):
+        os.kill(os.getpid(), 9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stumbles(Leaves):
+    \"\"\"Raises.\"\"\"
+
+    name = "stumbles"
+
+    def detect(self, scene, rng):
+        raise ZeroDivisionError("no houses\\nat all")
+"""
+
+
+@pytest.fixture(scope="module")
+def bad_plugins(tmp_path_factory):
+    """Return one file for all tests: names of plugins are taken once in a process."""
+    file = tmp_path_factory.mktemp("plugins") / "bad.py"
+    file.write_text(BAD_PLUGINS)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("Leaves", "left the interpreter with exit code 0"),
+        ("Crashes", "killed by signal 9"),
+        ("Stumbles", "ZeroDivisionError: no houses at all"),
+    ],
+)
+def test_check_plugin_outlives_a_detector_that_takes_its_process_along(cli, bad_plugins, name, problem):
+    result = cli("check-plugin", f"{bad_plugins}:{name}", code=3)
+    assert problem in result.stdout
+    assert "rules kept" in result.stdout.splitlines()[-1]
+    assert "told while" not in result.stdout
+
+
+@pytest.mark.parametrize(("name", "problem"), [("Leaves", "SystemExit: 0"), ("Stumbles", "no houses at all")])
+def test_detect_tells_an_error_of_the_detector_after_its_traceback(cli, bad_plugins, tmp_path, name, problem):
+    result = cli("detect", f"{bad_plugins}:{name}", "hamlet", "-o", "out.gpkg", code=3)
+    assert result.stdout == ""
+    *before, last = result.stderr.strip().splitlines()
+    assert last.startswith(f"Error: {name.lower()} failed on hamlet-0: ")
+    assert problem in last
+    assert any(line.startswith("Traceback") for line in before)
+    assert not (tmp_path / "out.gpkg").exists()
+
+
+def test_detect_notices_a_file_that_was_replaced(cli, misbehaving, tmp_path):
+    rb.save_scene(hamlet(1), tmp_path / "one")
+    rb.save_scene(hamlet(2), tmp_path / "two")
+    (tmp_path / "two" / "dem.tif").replace(tmp_path / "one" / "dem.tif")
+    assert "dem.tif changed since scene.toml was written" in cli("detect", "ndsm", "one", "-o", "out.gpkg", code=2)
+
+
+def test_pictures_of_steps_never_replace_a_folder_of_something_else(cli, tmp_path):
+    rb.save_scene(hamlet(1), tmp_path / "one")
+    told = cli("detect", "ndsm", "hamlet", "--steps", "one", "--overwrite", code=2)
+    assert "one holds" in told
+    cli("detect", "ndsm", "hamlet", "--steps", "steps")
+    cli("detect", "ndsm", "hamlet", "--steps", "steps", "--overwrite")
+
+
+def test_the_folder_for_results_is_checked_before_the_runs(cli, misbehaving, tmp_path):
+    (tmp_path / "out").write_text("a file")
+    told = cli("run", "hamlet", "-d", misbehaving, "-j", 0, "-o", "out", code=2)
+    assert "out cannot be made: it is a file" in told
+    assert "0 of 0 runs" in cli("ls").stdout
+
+
+def test_files_are_written_before_a_table_that_nobody_reads(cli, misbehaving, tmp_path, monkeypatch):
+    from roofbench.cli import sweep
+    from roofbench.reports.tables import Leaderboard
+
+    def closed(*_):
+        raise BrokenPipeError
+
+    monkeypatch.setattr(Leaderboard, "print", closed)
+    monkeypatch.setattr(sweep, "_print", closed)
+    for words in (
+        ("run", "hamlet", "-d", misbehaving, "-j", 0, "-o", "out"),
+        ("sweep", misbehaving, "hamlet", "--vary", "side=7,9", "-j", 0, "-o", "sweep.csv"),
+    ):
+        with pytest.raises(BrokenPipeError):
+            cli(*words)
+    assert (tmp_path / "out" / "leaderboard.csv").exists()
+    assert (tmp_path / "out" / "report.html").exists()
+    assert (tmp_path / "sweep.csv").exists()
+
+
+def test_a_store_without_room_is_one_sentence(monkeypatch, tmp_path):
+    import sqlite3
+
+    from command_line import roofbench
+
+    def full(*_):
+        raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr("roofbench.benchmark.store.writer.Store.save_plan", full)
+    told = roofbench("run", "hamlet", "-d", "ndsm", "-j", 0, folder=tmp_path, expect=2).stderr
+    assert told == "Error: the results store cannot be written or read: database or disk is full\n"

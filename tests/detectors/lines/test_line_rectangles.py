@@ -1,0 +1,266 @@
+"""Adjustment, extension, rectangles and dominant colours."""
+
+import naive_lines
+import numpy as np
+import pytest
+
+from roofbench.detectors.lines.adjustment import adjust_to_neighbours, adjust_to_shape, rotate
+from roofbench.detectors.lines.boxes import U0, U1, UX, UY, V0, V1, prefix_sums
+from roofbench.detectors.lines.colours import Colours, dominant_bins, dominant_ranges, yiq_bins
+from roofbench.detectors.lines.duplicates import find_duplicates, new_share
+from roofbench.detectors.lines.extension import Cover, Growth, extend_lines, extend_rectangle
+from roofbench.detectors.lines.final_rectangles import FinalRules, extend_final_side, lies_inside, shrink, strip_shares
+from roofbench.detectors.lines.initial_rectangles import INSIDE, TOO_NARROW, initial_rectangles, share_inside
+
+NONE = np.zeros((0, 1), dtype=np.int32)
+RULES = Growth(step=20.0, least_step=2.7, black_share=0.7, part=20.0, vegetation=48.0, entropy=0.0)
+
+
+def line(x, y, degrees, length):
+    angle = np.radians(degrees)
+    return np.array([x, y, np.cos(angle), np.sin(angle), -length / 2, length / 2, 0.0, 0.0])
+
+
+def cover(black, vegetation=None, entropy=None):
+    vegetation = np.zeros_like(black) if vegetation is None else vegetation
+    return Cover(prefix_sums(black), prefix_sums(vegetation), NONE if entropy is None else prefix_sums(entropy))
+
+
+def test_each_line_keeps_its_smallest_rotation_towards_a_neighbour():
+    rng = np.random.default_rng(3)
+    degrees, x, y = rng.uniform(0, 360, 40), rng.uniform(0, 1000, 40), rng.uniform(0, 1000, 40)
+    lines = np.array([line(*values, rng.uniform(20, 100)) for values in zip(x, y, degrees, strict=True)])
+    found = adjust_to_neighbours(lines, radius=250.0, tolerance=np.pi / 8, longer_only=False)
+    expected = naive_lines.rotation_candidates(np.radians(degrees), np.stack([x, y], 1), 250.0, np.pi / 8)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_longer_lines_are_turned_by_nothing_shorter():
+    lines = np.array([line(0, 0, 0, 100), line(30, 0, 93, 40), line(60, 0, 5, 30), line(900, 0, 0, 50)])
+    rotation = np.degrees(adjust_to_neighbours(lines, radius=100.0, tolerance=np.pi / 8, longer_only=True))
+    np.testing.assert_allclose(rotation, [0, -3, -2, np.nan], atol=1e-9)
+
+
+def test_the_longest_share_of_the_lines_are_references():
+    lines = np.array([line(0, 0, 0, 100), line(30, 0, 93, 40), line(60, 0, 5, 30), line(90, 0, 6, 20)])
+    all_of_them = adjust_to_neighbours(lines, radius=200.0, tolerance=np.pi / 8, longer_only=True)
+    half = adjust_to_neighbours(lines, radius=200.0, tolerance=np.pi / 8, longer_only=True, share=0.5)
+    np.testing.assert_allclose(np.degrees(all_of_them), [0, -3, -2, -1], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(half), [0, -3, -2, -3], atol=1e-9)
+
+
+def test_lines_of_a_shape_are_turned_to_its_longest_and_odd_ones_drop_out():
+    lines = np.array([line(0, 0, 10, 30), line(0, 9, 190, 90), line(5, 0, 104, 40), line(5, 5, 45, 50)])
+    one_shape = np.array([7, 7, 7, 7])
+    rotation = np.degrees(adjust_to_shape(lines, one_shape, tolerance=np.pi / 8, longest_only=True))
+    np.testing.assert_allclose(rotation, [0, 0, -4, np.nan], atol=1e-9)
+    rotation = np.degrees(adjust_to_shape(lines, np.array([1, 2, 2, 3]), tolerance=np.pi / 8, longest_only=True))
+    np.testing.assert_allclose(rotation, [0, 0, -4, 0], atol=1e-9)
+
+
+def test_lines_beyond_the_reach_of_the_longest_are_turned_to_the_next_longest():
+    lines = np.array([line(0, 0, 10, 90), line(0, 9, 45, 80), line(5, 0, 130, 40), line(5, 5, 97, 30)])
+    rotation = np.degrees(adjust_to_shape(lines, np.zeros(4, np.int64), tolerance=np.pi / 8, longest_only=False))
+    np.testing.assert_allclose(rotation, [0, 0, 5, 3], atol=1e-9)
+    rotation = np.degrees(
+        adjust_to_shape(lines[[0, 1, 3]], np.zeros(3, np.int64), tolerance=np.pi / 8, longest_only=False)
+    )
+    np.testing.assert_allclose(rotation, [0, np.nan, 3], atol=1e-9)
+
+
+def test_rotating_turns_a_line_about_its_centre():
+    turned = rotate(line(5, 6, 30, 10)[None], np.radians([15.0]))[0]
+    np.testing.assert_allclose(turned, line(5, 6, 45, 10), atol=1e-12)
+
+
+def test_a_line_is_extended_to_within_a_least_step_of_the_end_of_the_black():
+    black = np.zeros((100, 200), np.uint8)
+    black[20:80, 30:170] = 1
+    found = extend_lines(cover(black), RULES, line(100, 20, 0, 40)[None], 20.0)[0]
+    assert 100 + found[U0] == pytest.approx(30, abs=2.7)
+    assert 100 + found[U1] == pytest.approx(170, abs=2.7)
+
+
+def test_a_side_stops_at_a_court_that_takes_less_than_a_third_of_it():
+    black = np.zeros((120, 140), np.uint8)
+    black[20:100, 20:120] = 1
+    black[60:100, 60:84] = 0
+    box = line(70, 20, 0, 100)
+    box[V1] = 10.0
+    in_parts, as_a_whole = box.copy(), box.copy()
+    extend_rectangle(cover(black), RULES, in_parts)
+    extend_rectangle(cover(black), RULES._replace(part=1e6), as_a_whole)
+    assert 20 + in_parts[V1] == pytest.approx(60, abs=2.7)
+    assert 20 + as_a_whole[V1] == pytest.approx(100, abs=2.7)
+
+
+def test_extension_stops_at_vegetation_unless_its_texture_is_smooth():
+    black = np.zeros((100, 200), np.uint8)
+    black[20:80, 30:170] = 1
+    leaves, rough = np.zeros_like(black), np.zeros_like(black)
+    leaves[:, 130:] = 100
+    rough[:, 130:] = 200
+    start = line(100, 20, 0, 40)[None]
+    assert extend_lines(cover(black, leaves), RULES, start, 20.0)[0, U1] < 45
+    textured = RULES._replace(entropy=128.0)
+    assert extend_lines(cover(black, leaves, rough), textured, start, 20.0)[0, U1] < 45
+    assert extend_lines(cover(black, leaves, 0 * rough), textured, start, 20.0)[0, U1] > 60
+
+
+def test_a_strip_beyond_the_image_is_white():
+    found = extend_lines(cover(np.ones((50, 50), np.uint8)), RULES, line(25, 0, 0, 20)[None], 20.0)[0]
+    assert found[U1] <= 25 + 0.3 * 20
+
+
+def test_a_rectangle_grows_over_the_whole_black_shape():
+    black = np.zeros((100, 200), np.uint8)
+    black[20:80, 30:170] = 1
+    box = line(100, 20, 0, 40)
+    box[V1] = 10
+    extend_rectangle(cover(black), RULES, box)
+    assert (box[V0], box[V1]) == (0, pytest.approx(60, abs=2.7))
+    assert box[U1] - box[U0] == pytest.approx(140, abs=5.4)
+
+
+def test_the_longest_line_makes_the_rectangle_and_the_others_are_inside_it():
+    black = np.zeros((100, 200), np.uint8)
+    black[20:80, 30:170] = 1
+    lines = np.array([line(100, 20, 0, 130), line(100, 80, 180, 120), line(170, 50, 90, 50), line(100, 10, 180, 30)])
+    order = np.arange(4)
+    found, fate = initial_rectangles(cover(black), RULES, lines, order, 10.0, 20.0, 3.0, 0.75)
+    assert len(found) == 1
+    assert fate.tolist() == [0, INSIDE, INSIDE, TOO_NARROW]
+
+
+def test_a_line_is_inside_by_half_its_length_and_its_midpoint():
+    box = np.array([0.0, 0.0, 1.0, 0.0, -10.0, 10.0, -5.0, 5.0])
+    assert share_inside(line(0, 0, 0, 20), box, 0.0) == 1
+    assert share_inside(line(8, 0, 0, 20), box, 0.0) == pytest.approx(0.6)
+    assert share_inside(line(11, 0, 0, 20), box, 0.0) == 0
+    assert share_inside(line(0, 6, 0, 20), box, 0.0) == 0
+    assert share_inside(line(0, 6, 0, 20), box, 1.5) == 1
+
+
+def test_shrinking_takes_a_share_of_length_and_width_about_the_centre():
+    box = np.array([3.0, 4.0, 0.6, 0.8, 0.0, 100.0, 10.0, 50.0])
+    np.testing.assert_allclose(shrink(box, 0.15), [3, 4, 0.6, 0.8, 7.5, 92.5, 13, 47])
+
+
+def test_a_box_lies_inside_another_when_all_its_corners_do():
+    outer = np.array([0.0, 0.0, 1.0, 0.0, -10.0, 10.0, -10.0, 10.0])
+    turned = line(0, 0, 45, 19)
+    assert lies_inside(turned, outer)
+    turned[V1] = 5
+    assert not lies_inside(turned + np.array([3, 3, 0, 0, 0, 0, 0, 0]), outer)
+
+
+def rectangles(rng, count):
+    """Return random rectangles on a place so small that most overlap."""
+    boxes = np.array([line(*rng.uniform(0, 120, 2), rng.uniform(0, 180), rng.uniform(20, 90)) for _ in range(count)])
+    boxes[:, V1] = rng.uniform(20, 60, count)
+    return boxes
+
+
+def test_the_new_share_of_a_rectangle_is_what_lies_outside_the_union_of_the_others():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        boxes = rectangles(rng, 6)
+        assert new_share(boxes[0], boxes[1:]) == pytest.approx(naive_lines.new_share(boxes[0], boxes[1:]), abs=0.02)
+    assert new_share(boxes[0], boxes[:0]) == 1
+    assert new_share(boxes[0], boxes[:1]) == 0
+
+
+def test_duplicates_are_those_that_larger_turned_rectangles_cover():
+    rng = np.random.default_rng(8)
+    boxes = rectangles(rng, 60)
+    boxes[::3, UX:U0] = 1.0, 0.0
+    found = find_duplicates(boxes, least=0.31, tolerance=np.radians(3))
+    np.testing.assert_array_equal(found, naive_lines.duplicates(boxes, 0.31, 3.0))
+    assert 5 < found.sum() < 55
+    assert not find_duplicates(boxes, least=0.0, tolerance=np.radians(3)).any()
+
+
+def test_a_wing_stays_however_much_of_it_lies_in_the_house_and_a_turned_rectangle_does_not():
+    house, wing, turned = line(50, 30, 0, 60), line(60, 30, 90, 40), line(50, 32, 14, 52)
+    house[V1], wing[V1], turned[V1] = 40, 15, 30
+    found = find_duplicates(np.array([wing, turned, house]), least=0.1, tolerance=np.radians(3))
+    assert found.tolist() == [False, True, False]
+    assert not find_duplicates(np.array([turned]), least=0.1, tolerance=np.radians(3)).any()
+
+
+@pytest.mark.parametrize(
+    ("histogram", "expected"),
+    [
+        # One hill of 100: 3 + 20 + 50 + 25 = 98 reach 97 % of it; the foot of 2 stays out.
+        ([0, 2, 20, 50, 25, 3, 0, 0, 0, 0], [2, 3, 4, 5]),
+        # Two hills, cut after the minimum of 4: 65 and 35 of 100; both are needed for 90 %.
+        ([0, 1, 60, 4, 30, 5, 0, 0, 0, 0], [2, 3, 4, 5]),
+        # The first hill holds 95 %, so the second colour is not used.
+        ([0, 10, 80, 5, 0, 0, 5, 0, 0, 0], [1, 2, 3]),
+        ([0] * 10, []),
+        ([7, 0, 0, 0, 0, 0, 0, 0, 0, 0], [0]),
+    ],
+)
+def test_dominant_bins_of_histograms_worked_by_hand(histogram, expected):
+    found = dominant_bins(np.array(histogram), 0.97, 0.90)
+    assert np.flatnonzero(found).tolist() == expected
+
+
+def test_colours_fall_into_the_bins_of_their_yiq():
+    def bins(*rgb):
+        return yiq_bins(Colours(np.array(rgb, np.uint8).reshape(3, 1, 1), 255.0), 0, 0)
+
+    assert bins(0, 0, 0) == (0, 10, 10)
+    assert bins(255, 255, 255) == (9, 10, 10)
+    assert bins(255, 0, 0) == (2, 19, 14)
+    assert bins(0, 255, 0) == (5, 5, 0)
+    assert bins(0, 0, 255) == (1, 4, 15)
+
+
+def two_coloured():
+    values = np.empty((3, 60, 100), np.uint8)
+    values[:] = np.array([180, 60, 50])[:, None, None]
+    values[:, :, 60:] = np.array([60, 60, 180])[:, None, None]
+    return Colours(values, 255.0)
+
+
+def test_a_side_is_extended_as_far_as_the_colour_of_the_roof_reaches():
+    colours, black = two_coloured(), np.ones((60, 100), np.uint8)
+    box = np.array([30.0, 30.0, 1.0, 0.0, -10.0, 10.0, -10.0, 10.0])
+    within = dominant_ranges(colours, box, 0.97, 0.9)
+    rules = FinalRules(0.15, 0.97, 0.9, 2.3, 1.0, 0.4, 0.9, 0.1, 0.0, False)
+    extend_final_side(colours, black, black, within, rules, box, U1)
+    assert 30 + box[U1] == pytest.approx(60, abs=1.5)
+
+
+def test_a_side_ends_where_the_primary_mask_is_black_again_after_a_gap():
+    colours = Colours(np.full((3, 60, 100), 99, np.uint8), 255.0)
+    secondary = np.ones((60, 100), np.uint8)
+    primary = secondary.copy()
+    primary[:, 50:54] = 0
+    box = np.array([30.0, 30.0, 1.0, 0.0, -10.0, 10.0, -10.0, 10.0])
+    within = dominant_ranges(colours, box, 0.97, 0.9)
+    rules = FinalRules(0.15, 0.97, 0.9, 2.0, 1.0, 0.4, 0.9, 0.1, 0.1, False)
+    extend_final_side(colours, primary, secondary, within, rules, box, U1)
+    assert 50 <= 30 + box[U1] <= 54
+
+
+def test_shares_of_an_axis_parallel_strip_are_those_of_its_pixels():
+    colours, black = two_coloured(), np.zeros((60, 100), np.uint8)
+    black[:30] = 1
+    strip = np.array([50.0, 20.0, 0.0, 1.0, 0.0, 20.0, -20.0, 10.0])
+    within = dominant_ranges(colours, np.array([30.0, 30.0, 1.0, 0.0, -9.0, 9.0, -9.0, 9.0]), 0.97, 0.9)
+    assert strip_shares(colours, black, 1 - black, within, strip) == pytest.approx((20 / 30, 0.5, 0.5))
+
+
+def test_a_strip_thinner_than_a_pixel_is_sampled_once_across():
+    colours, black = two_coloured(), np.ones((60, 100), np.uint8)
+    strip = np.array([30.0, 20.5, 1.0, 0.0, 0.0, 10.0, 0.0, 0.3])
+    within = np.ones((3, 20), dtype=bool)
+    assert strip_shares(colours, black, black, within, strip) == (1, 1, 1)
+
+
+def test_directions_are_unit_vectors_after_all_steps():
+    lines = np.array([line(0, 0, 10, 30), line(0, 9, 190, 90)])
+    turned = rotate(lines, adjust_to_shape(lines, np.zeros(2, np.int64), tolerance=1.0, longest_only=True))
+    np.testing.assert_allclose(np.hypot(turned[:, UX], turned[:, UY]), 1)

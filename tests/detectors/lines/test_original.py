@@ -1,0 +1,166 @@
+"""The detector `original` end to end, on scenes made by hand."""
+
+import numpy as np
+import pytest
+import shapely
+from line_scenes import GREEN_ROOF, LEAVES, SceneBuilder, corners_off, rectangle
+
+from roofbench.core.errors import MissingInputError, ParameterError
+from roofbench.detectors.lines.original import Original
+from roofbench.detectors.registry import make_detector
+from roofbench.scenes.geodata.points import PointCloud
+from roofbench.scenes.geodata.raster import Elevation, Grid, Image
+from roofbench.scenes.scene import Scene
+
+
+def detect(scene, **parameters):
+    return Original(**parameters).detect(scene.for_detection(), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("degrees", [0, 13, 30, 45, 58, 77])
+def test_a_clean_rectangular_house_is_found_within_a_pixel_at_any_orientation(degrees):
+    builder = SceneBuilder().house(rectangle(30, 30, 15, 10, degrees))
+    found = detect(builder.build())
+    truth = builder.truth()[0]
+    assert len(found) == 1
+    assert corners_off(found.polygons[0], truth) < 0.15 * np.sqrt(2)
+
+
+def test_an_l_is_two_overlapping_rectangles():
+    wings = [rectangle(30, 26, 22, 8), rectangle(23, 31, 8, 18)]
+    builder = SceneBuilder().house(shapely.union_all(wings))
+    found = detect(builder.build())
+    assert len(found) == 2
+    assert found.polygons[0].intersects(found.polygons[1])
+    union = shapely.union_all(found.polygons)
+    truth = builder.truth()[0]
+    assert union.intersection(truth).area / union.union(truth).area > 0.9
+
+
+def test_a_u_with_a_narrow_court_is_three_overlapping_rectangles():
+    wings = [rectangle(30, 25, 18, 10), rectangle(24.75, 32, 7.5, 8), rectangle(35.25, 32, 7.5, 8)]
+    builder = SceneBuilder().house(shapely.union_all(wings))
+    found = detect(builder.build())
+    truth = builder.truth()[0]
+    union = shapely.union_all(found.polygons)
+    assert len(found) == 3
+    assert union.intersection(truth).area / union.union(truth).area > 0.9
+
+
+def test_a_tree_as_big_as_a_house_is_dropped_for_its_colour():
+    builder = SceneBuilder().house(rectangle(16, 40, 15, 10, 20)).tree(42, 18, 6.0, LEAVES)
+    found = detect(builder.build())
+    assert len(found) == 1
+    assert found.polygons[0].intersects(builder.truth()[0])
+
+
+def test_a_green_roof_is_lost_by_its_colour():
+    builder = SceneBuilder().house(rectangle(30, 30, 15, 10, 20), GREEN_ROOF)
+    found = detect(builder.build())
+    assert len(found) == 0
+    assert found.metadata["lines vegetation beside it"] == 4
+
+
+def test_the_printed_index_without_infrared_keeps_green_and_drops_red():
+    red = SceneBuilder().house(rectangle(30, 30, 15, 10, 20)).build()
+    green = SceneBuilder().house(rectangle(30, 30, 15, 10, 20), GREEN_ROOF).build()
+    assert len(detect(red, vegetation="pseudo-ndvi")) == 0
+    assert len(detect(green, vegetation="pseudo-ndvi")) == 1
+
+
+def test_two_houses_two_metres_apart_stay_two():
+    builder = SceneBuilder().house(rectangle(20, 30, 14, 10)).house(rectangle(36, 30, 14, 10))
+    found = detect(builder.build())
+    assert len(found) == 2
+    assert not found.polygons[0].intersects(found.polygons[1])
+
+
+@pytest.mark.parametrize(("gsd", "spacing"), [(0.1, 1.0), (0.25, 0.5), (0.5, 0.35)])
+def test_other_ground_sampling_distances_and_point_spacings_find_the_house(gsd, spacing):
+    builder = SceneBuilder(gsd=gsd, spacing=spacing).house(rectangle(30, 30, 15, 10, 30))
+    found = detect(builder.build())
+    assert len(found) == 1
+    truth = builder.truth()[0]
+    iou = found.polygons[0].intersection(truth).area / found.polygons[0].union(truth).area
+    assert iou > 0.85
+
+
+def test_moving_a_scene_by_whole_tiles_moves_its_result():
+    here = SceneBuilder().house(rectangle(30, 30, 15, 10, 30)).tree(45, 45, 3)
+    there = SceneBuilder(west=1000 + 675.0, south=2000 - 1350.0, houses=here.houses, trees=here.trees)
+    moved = shapely.affinity.translate(detect(here.build()).polygons[0], 675, -1350)
+    assert shapely.hausdorff_distance(moved, detect(there.build()).polygons[0]) < 1e-6
+
+
+def test_the_same_scene_gives_the_same_bits():
+    scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 30)).tree(45, 45, 3).build()
+    first, second = detect(scene), detect(scene)
+    assert shapely.to_wkb(first.polygons).tolist() == shapely.to_wkb(second.polygons).tolist()
+
+
+def test_no_building_no_point_and_no_known_elevation_give_an_empty_result():
+    bare = SceneBuilder().build()
+    assert len(detect(bare)) == 0
+    nothing = PointCloud(np.empty(0), np.empty(0), np.empty(0))
+    assert len(detect(Scene("empty", bare.extent, points=nothing, image=bare.image, dem=bare.dem))) == 0
+    house = SceneBuilder().house(rectangle(30, 30, 15, 10)).build()
+    unknown = Elevation(np.full((60, 60), np.nan, np.float32), house.dem.grid)
+    assert len(detect(Scene("blind", house.extent, points=house.points, image=house.image, dem=unknown))) == 0
+
+
+def test_a_house_cut_by_the_border_of_the_points_makes_no_line_along_the_border():
+    builder = SceneBuilder().house(rectangle(30, 0, 14, 12))
+    found = Original().trace(builder.build().for_detection())
+    assert len(found.final) == 1
+    assert {int(fate) for fate in found.fates} <= {0, 1, 5}
+
+
+def test_a_scene_without_image_or_elevation_is_refused_with_the_reason():
+    scene = SceneBuilder().build()
+    bare = Scene("bare", scene.extent, points=scene.points, dem=scene.dem)
+    with pytest.raises(MissingInputError, match="orthoimage"):
+        detect(bare)
+    assert bare.lacks(Original.requires)
+
+
+def test_a_16_bit_image_and_another_order_of_bands_change_nothing():
+    scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 30)).build()
+    values = scene.image.values[::-1].astype(np.uint16) * 257
+    image = Image(values, ("blue", "green", "red"), scene.image.grid)
+    other = Scene("16 bit", scene.extent, points=scene.points, image=image, dem=scene.dem)
+    assert shapely.to_wkb(detect(other).polygons).tolist() == shapely.to_wkb(detect(scene).polygons).tolist()
+
+
+def test_near_infrared_is_used_where_there_is_some():
+    scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 30), GREEN_ROOF).build()
+    infrared = scene.image.values[:1]
+    image = Image(np.concatenate([scene.image.values, infrared]), ("red", "green", "blue", "nir"), scene.image.grid)
+    assert len(detect(Scene("rgbi", scene.extent, points=scene.points, image=image, dem=scene.dem))) == 1
+
+
+def test_the_detector_is_found_by_name_and_checks_its_parameters():
+    assert make_detector("original[tile_size=500,ground=tile-mode]").changed() == {
+        "tile_size": 500.0,
+        "ground": "tile-mode",
+    }
+    with pytest.raises(ParameterError, match="reduction"):
+        make_detector("original[reduction=3]")
+
+
+def test_on_a_slope_the_tile_ground_fails_and_the_point_ground_does_not():
+    flat = SceneBuilder().house(rectangle(15, 45, 15, 10)).house(rectangle(45, 15, 15, 10)).build()
+    slope = 0.3
+    points = flat.points
+    tilted = PointCloud(points.x, points.y, points.z + slope * (points.x - flat.extent[0]))
+    grid = Grid(flat.dem.grid.west, flat.dem.grid.north, 1.0, 60, 60)
+    dem = Elevation((10 + slope * (np.arange(60) + 0.5) * np.ones((60, 1))).astype(np.float32), grid)
+    scene = Scene("slope", flat.extent, points=tilted, image=flat.image, dem=dem)
+    tile, point = detect(scene), detect(scene, ground="point-dem")
+    assert len(point) == 2
+    houses = [rectangle(1015, 2045, 15, 10), rectangle(1045, 2015, 15, 10)]
+    well = [
+        sum(any(p.intersection(h).area / p.union(h).area > 0.8 for p in found.polygons) for h in houses)
+        for found in (tile, point)
+    ]
+    assert well[1] == 2
+    assert well[0] < 2

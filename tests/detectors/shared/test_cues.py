@@ -1,0 +1,101 @@
+import naive_cues
+import numpy as np
+import pytest
+
+from roofbench.detectors.shared.cues import cell_cues, greenness
+from roofbench.scenes.geodata.points import PointCloud
+from roofbench.scenes.geodata.raster import Grid, Image
+
+GRID = Grid(500.0, 910.0, 1.0, 8, 10)
+
+
+def cloud(n=400, seed=0):
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(500, 510, n), rng.uniform(902, 910, n)
+    z = np.where(x < 505, 8 + 0.5 * (x - 500) + rng.normal(0, 0.02, n), rng.uniform(3, 12, n))
+    return x, y, z
+
+
+@pytest.mark.parametrize("width", [2, 3])
+def test_the_roughness_equals_a_plane_fitted_in_every_window(width):
+    x, y, z = cloud()
+    cues = cell_cues(PointCloud(x, y, z), z.astype(np.float32), GRID, threshold=2.5, window=float(width))
+    expected = naive_cues.roughness(x, y, z, GRID, width)
+    inner = (slice(1, -1), slice(1, -1))
+    np.testing.assert_allclose(cues.roughness[inner], expected[inner], rtol=1e-3, atol=1e-4)
+
+
+def test_roofs_are_smooth_and_crowns_rough():
+    x, y, z = cloud()
+    rough = cell_cues(PointCloud(x, y, z), z.astype(np.float32), GRID, threshold=2.5, window=2.0).roughness
+    assert np.nanmax(rough[:, :4]) < 0.1
+    assert np.nanmedian(rough[:, 6:]) > 1
+
+
+def test_points_on_one_line_have_no_roughness():
+    x = np.linspace(500.1, 509.9, 200)
+    z = np.full(200, 7.0)
+    cues = cell_cues(PointCloud(x, np.full(200, 905.5), z), z.astype(np.float32), GRID, threshold=2.5, window=2.0)
+    assert np.isnan(cues.roughness).all()
+
+
+def test_shares_count_what_they_say():
+    x, y = np.array([500.5, 500.5, 500.5, 500.5]), np.array([909.5] * 4)
+    heights = np.array([8.0, 7.0, 0.0, np.nan], dtype=np.float32)
+    points = PointCloud(x, y, heights.astype(float), number_of_returns=np.array([3, 1, 3, 2], dtype=np.uint8))
+    cues = cell_cues(points, heights, GRID, threshold=2.5, window=1.0)
+    assert cues.count[0, 0] == 3
+    assert cues.high_share[0, 0] == pytest.approx(2 / 3)
+    assert cues.penetration[0, 0] == pytest.approx(1 / 3)
+    assert cues.multiple_share[0, 0] == pytest.approx(1 / 2)
+    assert cues.height[0, 0] == pytest.approx(7.5)
+    # A cell without points takes what is around, one far away knows nothing.
+    assert cues.high_share[1, 1] == pytest.approx(2 / 3)
+    assert np.isnan(cues.high_share[5, 5])
+
+
+def test_single_returns_alone_tell_nothing_of_multiple_returns():
+    x, y, z = cloud()
+    points = PointCloud(x, y, z, number_of_returns=np.ones(len(x), dtype=np.uint8))
+    assert cell_cues(points, z.astype(np.float32), GRID, threshold=2.5, window=2.0).multiple_share is None
+
+
+@pytest.mark.parametrize("gsd", [0.25, 1.0, 2.0])
+def test_greenness_is_that_of_the_place_at_any_pixel_size(gsd):
+    fine = Grid.covering(GRID.extent, gsd)
+    column = np.broadcast_to(np.arange(fine.columns), fine.shape)
+    green = column * gsd < 4
+    values = np.stack([np.where(green, 80, 120), np.where(green, 160, 120), np.full(fine.shape, 90)]).astype(np.uint8)
+    index = greenness(Image(values, ("red", "green", "blue"), fine), GRID, darkest=0.1)
+    np.testing.assert_allclose(index[:, :3], 1 / 3, atol=0.01)
+    np.testing.assert_allclose(index[:, 5:], 0, atol=0.01)
+
+
+def test_shadow_and_missing_pixels_have_no_greenness():
+    values = np.full((3, 8, 10), 100, dtype=np.uint8)
+    values[:, :, :3] = 5
+    valid = np.ones((8, 10), dtype=bool)
+    valid[:, 8:] = False
+    index = greenness(Image(values, ("red", "green", "blue"), GRID, valid), GRID, darkest=0.1)
+    assert np.isnan(index[:, :3]).all()
+    assert np.isnan(index[:, 8:]).all()
+    assert (index[:, 3:8] == 0).all()
+
+
+def test_a_grey_image_has_no_greenness():
+    grey = Image(np.full((1, 8, 10), 100, dtype=np.uint8), ("grey",), GRID)
+    assert greenness(grey, GRID, darkest=0.1) is None
+
+
+@pytest.mark.parametrize("window", [2.0, 3.0])
+def test_working_in_strips_changes_nothing(monkeypatch, window):
+    import roofbench.detectors.shared.cues as module
+
+    x, y, z = cloud(seed=4)
+    points, heights = PointCloud(x, y * 4 - 2730, z), z.astype(np.float32)
+    grid = Grid(500.0, 910.0, 1.0, 32, 10)
+    whole = cell_cues(points, heights, grid, threshold=2.5, window=window).roughness
+    monkeypatch.setattr(module, "_STRIP", 1)
+    np.testing.assert_allclose(
+        cell_cues(points, heights, grid, threshold=2.5, window=window).roughness, whole, rtol=1e-5
+    )

@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.affinity import rotate
+
+from roofbench.detectors.shared.outlines import coverage_of_mask, minimum_rectangles, simplify, trace
+from roofbench.detectors.shared.regularise import regularise
+from roofbench.scenes.geodata.raster import Grid
+
+GRID = Grid(100.0, 240.0, 0.5, 80, 100)
+
+
+def centres():
+    column, row = np.meshgrid(np.arange(GRID.columns) + 0.5, np.arange(GRID.rows) + 0.5)
+    return GRID.to_world(row, column)
+
+
+def covered(polygon):
+    """Share of each cell that a polygon covers, exactly."""
+    x, y = centres()
+    cells = shapely.box(x - 0.25, y - 0.25, x + 0.25, y + 0.25)
+    return (shapely.area(shapely.intersection(cells, polygon)) / 0.25).astype(np.float32)
+
+
+def traced(polygon):
+    share = covered(polygon)
+    return trace(coverage_of_mask(share >= 0.5, share), GRID)
+
+
+def iou(one, two):
+    return one.intersection(two).area / one.union(two).area
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_an_outline_encloses_exactly_the_centres_of_the_mask(seed):
+    mask = np.random.default_rng(seed).random(GRID.shape) < 0.6
+    polygons = trace(coverage_of_mask(mask), GRID)
+    x, y = centres()
+    inside = np.zeros(GRID.shape, dtype=bool)
+    for polygon in polygons:
+        inside |= shapely.contains_xy(polygon, x, y)
+    np.testing.assert_array_equal(inside, mask)
+    assert shapely.is_valid(polygons).all()
+
+
+def test_shares_place_the_outline_within_a_fraction_of_a_cell():
+    house = shapely.box(110.13, 210.2, 124.38, 219.57)
+    (polygon,) = traced(house)
+    assert polygon.area == pytest.approx(house.area, rel=0.02)
+    assert iou(polygon, house) > 0.97
+
+
+def test_holes_stay_and_objects_end_at_the_border_of_the_grid():
+    ring = shapely.box(110, 210, 130, 230).difference(shapely.box(115, 215, 125, 225))
+    (polygon,) = traced(ring)
+    assert len(polygon.interiors) == 1
+    (whole,) = trace(np.ones(GRID.shape, dtype=np.float32), GRID)
+    assert shapely.box(*whole.bounds).within(shapely.box(*GRID.extent).buffer(1e-6))
+    assert len(trace(np.zeros(GRID.shape, dtype=np.float32), GRID)) == 0
+
+
+@pytest.mark.parametrize("angle", [0, 9, 23, 45, 80])
+def test_a_t_shape_gets_its_eight_corners_back_at_any_angle(angle):
+    shape = shapely.box(112, 222, 136, 230).union(shapely.box(120, 208, 128, 222))
+    shape = rotate(shape, angle, origin="centroid")
+    (regular,) = regularise(traced(shape), 0.5)
+    assert shapely.get_num_coordinates(regular) - 1 == 8
+    assert iou(regular, shape) > 0.97
+
+
+def test_walls_that_follow_no_main_direction_stay_as_they_are():
+    # A house with one wall at 30 degrees to the others.
+    house = shapely.Polygon([(110, 210), (130, 210), (130, 216), (116, 224.1), (110, 224.1)])
+    (regular,) = regularise(traced(house), 0.5)
+    assert iou(regular, house) > 0.97
+    assert shapely.get_num_coordinates(regular) - 1 == 5
+
+
+def test_a_round_tower_is_not_squared():
+    tower = shapely.Point(125, 220).buffer(9)
+    (regular,) = regularise(traced(tower), 0.5)
+    assert iou(regular, tower) > 0.9
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_regularised_outlines_are_valid_and_agree_with_what_was_traced(seed):
+    rng = np.random.default_rng(seed)
+    boxes = [
+        rotate(shapely.box(x, y, x + w, y + h), angle)
+        for x, y, w, h, angle in rng.uniform([108, 206, 4, 4, 0], [130, 226, 14, 12, 90], (5, 5))
+    ]
+    polygons = traced(shapely.union_all(boxes))
+    regular = regularise(polygons, 0.5)
+    assert shapely.is_valid(regular).all()
+    for one, two in zip(regular, polygons, strict=True):
+        assert iou(one, two) > 0.8
+
+
+def test_simplifying_moves_no_vertex_further_than_the_tolerance():
+    polygons = traced(rotate(shapely.box(110, 210, 130, 222), 20))
+    simple = simplify(polygons, 0.4)
+    assert shapely.get_num_coordinates(simple)[0] < shapely.get_num_coordinates(polygons)[0]
+    assert shapely.hausdorff_distance(simple[0], polygons[0]) <= 0.4 + 1e-9
+
+
+def test_minimum_rectangles_hold_their_polygons():
+    polygons = traced(rotate(shapely.box(110, 210, 130, 222), 20))
+    (rectangle,) = minimum_rectangles(polygons)
+    assert rectangle.buffer(1e-6).contains(polygons[0])
+    assert shapely.get_num_coordinates(rectangle) == 5

@@ -1,0 +1,358 @@
+"""The studies behind docs/line-detectors.md: pattern of results, what is lost where, ablation, sensitivity, pictures.
+
+Run by hand: ``python tests/benchmarks/study_lines.py STUDY [--seeds 1,2,3]``; ``--help`` names the studies.
+
+Tables go to standard output as Markdown, pictures to docs/images. Scenes are made once and kept in the folder named by
+ROOFBENCH_BENCH_SCENES (default: bench-scenes). Figures are means over scenes and seeds of the percentages of each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+import roofbench as rb
+
+IMAGES = Path(__file__).parents[2] / "docs" / "images"
+FAIRFIELD = ("fairfield-1", "fairfield-2", "fairfield-3")
+AREAS = {"Fairfield 1-3": FAIRFIELD, "Moonee Ponds": ("moonee-ponds",), "Knox": ("knox",)}
+COLUMNS = ("C_m", "C_r", "Q_l", "M_d", "D_o", "C_rd", "C_rr", "C_mp", "C_rp", "Q_lp", "RMSE m")
+
+ABLATIONS = {
+    "original": (
+        "marking=squares",
+        "ground=point-dem",
+        "ground=tile-mode",
+        "vegetation=pseudo-ndvi",
+        "adjustment_reference=any",
+        "adjustment_share=1",
+        "missed_corner=1000",
+        "curve_step=0.15",
+        "extension_part=3",
+        "extension_part=6",
+        "extension_part=1000",
+        "extension_part=1000,extension_black=0.8",
+        "inside_share=0.75",
+        "inside_share=1",
+        "inside_margin=0",
+        "rise=0",
+        "compare=whole",
+        "new_share=0",
+        "new_share=0.2",
+    ),
+    "improved": (
+        "marking=squares",
+        "ground=tile-dem",
+        "below_ground=1",
+        "entropy_threshold=0.3",
+        "vegetation_side=inside",
+        "adjustment=longest",
+        "adjustment=neighbours",
+        "adjustment=none",
+        "vote_length=printed",
+        "voting=false",
+        "texture=false",
+        "texture=false,voting=false",
+        "texture_margin=0",
+        "edge_contrast=0",
+        "peak_ratio=1",
+        "missed_corner=1000",
+        "curve_step=0.15",
+        "extension_part=3",
+        "extension_part=6",
+        "extension_part=1000",
+        "extension_part=1000,extension_black=0.8",
+        "extension_stop=0.4",
+        "minimum_side=2.5",
+        "inside_share=0.75",
+        "inside_share=1",
+        "inside_margin=0",
+        "rise=0",
+        "new_share=0",
+        "new_share=0.2",
+    ),
+}
+#: Steps that the page shows.
+PICTURED = {
+    "original-01-masks",
+    "original-02-lines",
+    "original-04-initial-rectangles",
+    "original-05-final-rectangles",
+    "improved-02-lines",
+    "improved-05-votes",
+    "improved-06-final-rectangles",
+    "improved-07-histograms",
+}
+#: The five parameters of figure 8 and the values of section 4.4.1.
+SENSITIVITY = {
+    "tile_size": (400, 450, 500, 550, 600),
+    "black_share": (0.6, 0.7, 0.8, 0.9, 1.0),
+    "vegetation_threshold": (32, 40, 48, 56, 64),
+    "reduction": (0.10, 0.15, 0.20, 0.25, 0.30),
+    "colour_similarity": (0.2, 0.3, 0.4, 0.5, 0.6),
+}
+LABELS = {
+    "tile_size": "tile size (px of 0.15 m)",
+    "black_share": "black pixel threshold",
+    "vegetation_threshold": "vegetation threshold",
+    "reduction": "area reduction",
+    "colour_similarity": "colour similarity",
+}
+
+
+def scene_of(name, seed):
+    folder = Path(os.environ.get("ROOFBENCH_BENCH_SCENES", "bench-scenes"))
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}-{seed}"
+    if not path.exists():
+        rb.save_scene(rb.make_scene(name, seed=seed), path)
+    return rb.open_scene(path)
+
+
+def indices(scene, selection, reference=None):
+    """Return the percentages of COLUMNS of one detector on one scene, against its reference or another."""
+    found = rb.make_detector(selection).detect(scene.for_detection(), np.random.default_rng(0))
+    result = rb.make_evaluator("threshold-free").evaluate(found, reference or scene.reference)
+    by_object, pixel = result.object, result.pixel
+    shares = (
+        by_object.completeness, by_object.correctness, by_object.quality, by_object.multiple_detection_rate,
+        by_object.detection_overlap_rate, by_object.detection_cross_lap_rate, by_object.reference_cross_lap_rate,
+        pixel.completeness, pixel.correctness, pixel.quality,
+    )  # fmt: skip
+    return [None if share is None else 100 * share for share in shares] + [result.geometric.rmse]
+
+
+def means(rows):
+    columns = ([value for value in column if value is not None] for column in zip(*rows, strict=True))
+    return [statistics.fmean(column) if column else float("nan") for column in columns]
+
+
+def cells(row):
+    """Return a row of COLUMNS as cells of a table: percentages to a tenth, metres to a centimetre."""
+    return " | ".join([f"{share:.1f}" for share in row[:-1]] + [f"{row[-1]:.2f}"])
+
+
+def pattern(seeds):
+    print("| detector, area | " + " | ".join(COLUMNS) + " |")
+    print("|---" * (len(COLUMNS) + 1) + "|")
+    for area, names in AREAS.items():
+        scenes = [scene_of(name, seed) for name in names for seed in seeds]
+        for detector in ("original", "original[ground=point-dem]", "improved"):
+            row = means([indices(scene, detector) for scene in scenes])
+            print(f"| {detector}, {area} | {cells(row)} |", flush=True)
+
+
+def ablation(seeds, detectors):
+    chosen = {area: [scene_of(name, seed) for name in names for seed in seeds] for area, names in AREAS.items()}
+    heads = " | ".join(f"{area} Q_l | Q_lp" for area in AREAS)
+    for detector in detectors:
+        print(f"| {detector} | {heads} |")
+        print("|---" * (2 * len(AREAS) + 1) + "|")
+        base = None
+        for change in ("", *ABLATIONS[detector]):
+            values = []
+            for scenes in chosen.values():
+                row = means([indices(scene, f"{detector}[{change}]") for scene in scenes])
+                values += [row[2], row[9]]
+            if base is None:
+                base, text = values, [f"{value:.1f}" for value in values]
+            else:
+                text = [f"{value - before:+.1f}" for value, before in zip(values, base, strict=True)]
+            print(f"| {f'`{change}`' if change else 'as it is'} | " + " | ".join(text) + " |", flush=True)
+
+
+def sensitivity(seeds):
+    from matplotlib.figure import Figure
+
+    scenes = [scene_of(name, seed) for name in FAIRFIELD for seed in seeds]
+    print("| parameter | value | Q_l | Q_lp |\n|---|---|---|---|")
+    figure = Figure(figsize=(11, 3.6))
+    panels = figure.subplots(1, 2, sharex=True)
+    for parameter, values in SENSITIVITY.items():
+        rows = [means([indices(scene, f"original[{parameter}={value}]") for scene in scenes]) for value in values]
+        default = rb.make_detector("original").values()[parameter]
+        for value, row in zip(values, rows, strict=True):
+            mark = " (standard)" if value == default else ""
+            print(f"| {LABELS[parameter]} | {value:g}{mark} | {row[2]:.1f} | {row[9]:.1f} |", flush=True)
+        for panel, column in zip(panels, (2, 9), strict=True):
+            panel.plot(range(1, 6), [row[column] for row in rows], marker="o", label=LABELS[parameter])
+    for panel, title in zip(panels, ("object quality Q_l, %", "pixel quality Q_lp, %"), strict=True):
+        panel.set_title(title, fontsize=10)
+        panel.set_xlabel("number of the value (1 to 5)")
+        panel.set_xticks(range(1, 6))
+        panel.grid(alpha=0.3)
+    panels[1].legend(fontsize=8, loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
+    save(figure, "lines-sensitivity.png")
+
+
+def entropy(seeds):
+    scenes = {area: [scene_of(name, seed) for name in names for seed in seeds] for area, names in AREAS.items()}
+    print("| entropy_threshold | " + " | ".join(f"{area} Q_l | Q_lp" for area in scenes) + " |")
+    print("|---" * (2 * len(scenes) + 1) + "|")
+    for value in (0.3, 0.6, 0.65, 0.7, 0.75, 0.8):
+        text = []
+        for members in scenes.values():
+            row = means([indices(scene, f"improved[entropy_threshold={value}]") for scene in members])
+            text += [f"{row[2]:.1f}", f"{row[9]:.1f}"]
+        print(f"| {value:g} | " + " | ".join(text) + " |", flush=True)
+
+
+def loss_of(reference, trace, lines, detected):
+    """Return the step that lost one reference, from what lies in it."""
+    import shapely
+
+    from roofbench.detectors.lines.trace import Fate
+
+    if reference.intersection(detected).area > 0.4 * reference.area:
+        return "covered by another part"
+    xmin, ymin, xmax, ymax = reference.bounds
+    x, y = np.meshgrid(np.arange(xmin, xmax, 0.2), np.arange(ymin, ymax, 0.2))
+    inside = shapely.contains_xy(reference, x, y)
+    cells, on = trace.grid.cells(x[inside], y[inside])
+    if not (trace.masks.primary.ravel()[cells] & on).mean() >= 0.5:
+        return "mask: less than half black"
+    fates = trace.fates[shapely.distance(lines, reference.exterior) < 1.2]
+    if not len(fates):
+        return "no line of 3 m"
+    if (fates == Fate.RECTANGLE).any():
+        from roofbench.detectors.lines.boxes import box_corners
+
+        corners = box_corners(trace.candidates[~trace.kept & ~trace.duplicates])
+        lost = shapely.polygons(np.stack(trace.grid.to_world(corners[..., 1], corners[..., 0]), axis=-1))
+        covers = shapely.area(shapely.intersection(lost, reference)) > 0.4 * reference.area
+        return "texture" if covers.any() else "rectangle elsewhere"
+    return "lines: " + Fate(int(np.bincount(fates).argmax())).label
+
+
+def losses(seeds):
+    """Count the missed references by the step that lost them."""
+    import shapely
+
+    from roofbench.detectors.lines.boxes import box_centres
+
+    counts, heads = [], []
+    for detector in ("original", "improved"):
+        for area, names in AREAS.items():
+            counted, size = Counter(), 0
+            for scene in (scene_of(name, seed) for name in names for seed in seeds):
+                trace = rb.make_detector(detector).trace(scene.for_detection())
+                found = rb.make_detector(detector).detect(scene.for_detection(), np.random.default_rng(0))
+                verdicts = rb.make_evaluator("threshold-free").evaluate(found, scene.reference).verdicts.references
+                middle = box_centres(trace.fitted)
+                lines = shapely.points(*trace.grid.to_world(middle[:, 1], middle[:, 0]))
+                detected = shapely.union_all(found.polygons)
+                size += len(scene.reference)
+                for polygon, verdict in zip(scene.reference.polygons, verdicts["verdict"], strict=True):
+                    if verdict == "FN":
+                        counted[loss_of(polygon, trace, lines, detected)] += 1
+            counts.append(counted)
+            heads.append(f"{detector}, {area} ({size})")
+    print("| lost by | " + " | ".join(heads) + " |")
+    print("|---" * (len(heads) + 1) + "|")
+    for reason in sorted({reason for counted in counts for reason in counted}):
+        print(f"| {reason} | " + " | ".join(str(counted[reason]) for counted in counts) + " |")
+    print("| all missed | " + " | ".join(str(counted.total()) for counted in counts) + " |")
+
+
+def above_tile(scene):
+    """Return the references of section 4.1 of the 2010 paper: most of what the laser saw in them is above T_h."""
+    import shapely
+
+    from roofbench.detectors.lines.line_detector import PAPER_PIXEL
+    from roofbench.detectors.lines.masks import ground_heights
+
+    original, cloud = rb.make_detector("original"), scene.points
+    side = original.values()["tile_size"] * PAPER_PIXEL
+    limit = ground_heights(cloud, scene.dem, method="tile-dem", tile_side=side) + original.values()["height"]
+    tree = shapely.STRtree(shapely.points(cloud.x, cloud.y))
+    high = [
+        (cloud.z[inside] > limit[inside]).mean() >= 0.5
+        for inside in (tree.query(polygon, predicate="contains") for polygon in scene.reference.polygons)
+    ]
+    return scene.reference.take(np.flatnonzero(high))
+
+
+def tiles(seeds):
+    """Compare `original` with the reference as it is and with what the paper's reference holds."""
+    print("| reference | entities | " + " | ".join(COLUMNS) + " |\n" + "|---" * (len(COLUMNS) + 2) + "|")
+    scenes = [scene_of(name, seed) for name in FAIRFIELD for seed in seeds]
+    for label, references in (
+        ("all", [scene.reference for scene in scenes]),
+        ("above T_h of their tile", [above_tile(scene) for scene in scenes]),
+    ):
+        row = means([indices(scene, "original", known) for scene, known in zip(scenes, references, strict=True)])
+        print(f"| {label} | {sum(map(len, references))} | {cells(row)} |", flush=True)
+
+
+def save(figure, name):
+    """Save a picture of less than 300 kB: with 256 colours, then smaller."""
+    from PIL import Image as Picture
+
+    IMAGES.mkdir(parents=True, exist_ok=True)
+    for dpi in (90, 75, 60, 50):
+        figure.savefig(IMAGES / name, dpi=dpi, bbox_inches="tight")
+        with Picture.open(IMAGES / name) as picture:
+            picture.convert("RGB").quantize(256, Picture.Quantize.MAXCOVERAGE).save(IMAGES / name, optimize=True)
+        if (IMAGES / name).stat().st_size < 290_000:
+            return
+
+
+def crop(scene, share):
+    """Return the part of a scene around its centre, `share` of its width and height."""
+    xmin, ymin, xmax, ymax = scene.extent
+    x, y = (xmin + xmax) / 2, (ymin + ymax) / 2
+    half = share * (xmax - xmin) / 2, share * (ymax - ymin) / 2
+    grid = scene.image.grid
+    top, bottom = (round((grid.north - value) / grid.gsd) for value in (y + half[1], y - half[1]))
+    left, right = (round((value - grid.west) / grid.gsd) for value in (x - half[0], x + half[0]))
+    part = rb.Grid(grid.west + left * grid.gsd, grid.north - top * grid.gsd, grid.gsd, bottom - top, right - left)
+    image = rb.Image(scene.image.values[:, top:bottom, left:right].copy(), scene.image.bands, part)
+    cloud = scene.points
+    xmin, ymin, xmax, ymax = part.extent
+    inside = (cloud.x >= xmin) & (cloud.x <= xmax) & (cloud.y >= ymin) & (cloud.y <= ymax)
+    return rb.Scene("part", part.extent, crs=scene.crs, points=cloud.take(inside), image=image, dem=scene.dem)
+
+
+def pictures(_seeds):
+    from matplotlib.figure import Figure
+
+    for detector, name, share in (("original", "fairfield-1", 0.4), ("improved", "moonee-ponds", 0.22)):
+        scene = crop(scene_of(name, 1), share)
+        for step in rb.make_detector(detector).steps(scene, np.random.default_rng(0)):
+            if f"{detector}-{step.name}" not in PICTURED:
+                continue
+            figure = Figure()
+            step.draw(figure)
+            save(figure, f"lines-{detector}-{step.name}.png")
+
+
+STUDIES = {
+    "pattern": pattern,
+    "losses": losses,
+    "tiles": tiles,
+    "sensitivity": sensitivity,
+    "entropy": entropy,
+    "pictures": pictures,
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("study", choices=("ablation", *STUDIES))
+    parser.add_argument("--seeds", default="1,2,3")
+    parser.add_argument("--detectors", default="original,improved")
+    options = parser.parse_args()
+    seeds = [int(seed) for seed in options.seeds.split(",")]
+    if options.study == "ablation":
+        ablation(seeds, options.detectors.split(","))
+    else:
+        STUDIES[options.study](seeds)
+
+
+if __name__ == "__main__":
+    main()
