@@ -278,7 +278,7 @@ def test_only_the_detectors_that_are_named_are_compared(cli, misbehaving, tmp_pa
 
 
 def test_a_dirty_tree_cannot_become_a_baseline(cli, monkeypatch):
-    answers = {"rev-parse": str(provenance._ROOT_FOLDER), "status": " M gate.py"}
+    answers = {"rev-parse": str(provenance.FOLDER), "status": " M gate.py"}
     monkeypatch.setattr(provenance, "_git", lambda *arguments: answers[arguments[0]])
     provenance.code_version.cache_clear()
     with pytest.raises(RoofbenchError, match="uncommitted changes"):

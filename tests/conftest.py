@@ -5,7 +5,7 @@ import pytest
 from roofbench.benchmark.execution.tasks import Task
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 
-MISBEHAVING = f"{Path(__file__).parents[1] / 'plugins' / 'misbehaving.py'}:Misbehaving"
+MISBEHAVING = f"{Path(__file__).parent / 'plugins' / 'misbehaving.py'}:Misbehaving"
 
 
 @pytest.fixture
