@@ -19,7 +19,7 @@ from .core.package import HOMES, VERSION
 if TYPE_CHECKING:
     from .benchmark.session import detect, run
     from .core.errors import RoofbenchError
-    from .core.parameters import parameter
+    from .core.parameters import execution_option, parameter
     from .detectors.base import Detector, Step
     from .detectors.registry import make_detector
     from .evaluators.base import Evaluation, Evaluator, Index
@@ -61,6 +61,7 @@ __all__ = [
     "Step",
     "detect",
     "evaluate",
+    "execution_option",
     "import_scene",
     "make_detector",
     "make_evaluator",

@@ -234,16 +234,19 @@ def plan_content(suite: Suite) -> dict[str, Any]:
         "name": suite.name,
         "scenes": [scene_recipe(scene).to_dict() for scene in suite.scenes],
         "detectors": [
-            {**_recipe(entrant.detector).to_dict(), "seeds": list(entrant.seeds)} for entrant in suite.entrants
+            {**_recipe(entrant.detector).to_dict(execution=True), "seeds": list(entrant.seeds)}
+            for entrant in suite.entrants
         ],
-        "evaluators": [_recipe(evaluator).to_dict() for evaluator in suite.evaluators],
+        "evaluators": [_recipe(evaluator).to_dict(execution=True) for evaluator in suite.evaluators],
     }
 
 
 def suite_from_content(content: Mapping[str, Any]) -> Suite:
     """Return the suite that `plan_content` wrote down."""
     entrants: Sequence[Entrant] = [
-        Entrant(PluginRecipe(item["use"], item["parameters"]).detector(), tuple(item["seeds"]))
+        Entrant(
+            PluginRecipe(item["use"], item["parameters"], item.get("execution", {})).detector(), tuple(item["seeds"])
+        )
         for item in content["detectors"]
     ]
     return Suite(

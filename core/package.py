@@ -30,6 +30,7 @@ HOMES = {
     "Step": "detectors.base",
     "detect": "benchmark.session",
     "evaluate": "evaluators.comparison",
+    "execution_option": "core.parameters",
     "import_scene": "scenes.importing.scene_import",
     "make_detector": "detectors.registry",
     "make_evaluator": "evaluators.registry",

@@ -2,6 +2,10 @@
 
 A *parameter* is a dataclass field made by `parameter`. It carries its unit, range, meaning and source, so that one
 declaration serves validation, ``-d "name[parameter=value]"`` on the command line, sweeps and the documentation.
+
+An *execution option* is a dataclass field made by `execution_option`: the number of threads, for instance. It changes
+the time and memory of a run and never its result. It is set in the same way, ``name[threads=2]`` or ``-p threads=2``,
+but it is no parameter: keys, labels and sweeps do not see it, and objects that differ in it alone are equal.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from typing import Any, Self
 from .errors import ParameterError
 from .registry import nearest_hint
 
-__all__ = ["Parameter", "Parameterised", "parameter"]
+__all__ = ["Parameter", "Parameterised", "execution_option", "parameter"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -151,39 +155,71 @@ def parameter(
     return dataclasses.field(default=default, metadata={"parameter": facts})
 
 
+def execution_option(
+    default: Any,
+    *,
+    unit: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    choices: tuple[Any, ...] = (),
+    doc: str = "",
+) -> Any:
+    """Declare an execution option: a dataclass field that changes the time of a run and never its result.
+
+    Examples
+    --------
+    >>> import dataclasses
+    >>> @dataclasses.dataclass(frozen=True, kw_only=True)
+    ... class Threshold(Parameterised):
+    ...     height: float = parameter(2.5, unit="m", minimum=0, doc="height above ground")
+    ...     threads: int = execution_option(1, minimum=1, doc="number of threads")
+    >>> fast = Threshold.build({"threads": "2"})
+    >>> fast.threads, fast.values(), fast == Threshold()
+    (2, {'height': 2.5}, True)
+    """
+    facts = {"unit": unit, "minimum": minimum, "maximum": maximum, "choices": choices, "doc": doc}
+    return dataclasses.field(default=default, compare=False, metadata={"execution": facts})
+
+
 class Parameterised:
     """Mixin of frozen dataclasses whose fields are parameters: checked on construction, listed on request."""
 
     def __post_init__(self) -> None:
         owner = getattr(self, "name", None) or type(self).__name__
-        for name, rule in self.parameters().items():
+        for name, rule in {**self.parameters(), **self.execution_options()}.items():
             object.__setattr__(self, name, rule.check(getattr(self, name), owner))
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """Return the declared parameters by name, in order of declaration."""
-        cached: dict[str, Parameter] | None = cls.__dict__.get("_parameters")
+        return cls._declared("parameter")
+
+    @classmethod
+    def execution_options(cls) -> dict[str, Parameter]:
+        """Return the declared execution options by name, in order of declaration."""
+        return cls._declared("execution")
+
+    @classmethod
+    def _declared(cls, kind: str) -> dict[str, Parameter]:
+        """Return the fields that were declared as parameters or as execution options."""
+        cached: dict[str, Parameter] | None = cls.__dict__.get(f"_declared_{kind}")
         if cached is None:
             hints = typing.get_type_hints(cls)
             cached = {}
             for field in dataclasses.fields(cls):  # type: ignore[arg-type]
-                if "parameter" in field.metadata:
-                    kind, optional = _plain_type(hints[field.name])
+                if kind in field.metadata:
+                    plain, optional = _plain_type(hints[field.name])
                     cached[field.name] = Parameter(
-                        name=field.name,
-                        type=kind,
-                        optional=optional,
-                        default=field.default,
-                        **field.metadata["parameter"],
+                        name=field.name, type=plain, optional=optional, default=field.default, **field.metadata[kind]
                     )
-            cls._parameters = cached  # type: ignore[attr-defined]
+            setattr(cls, f"_declared_{kind}", cached)
         return cached
 
     @classmethod
     def build(cls, values: Mapping[str, Any] | None = None) -> Self:
         """Build from a mapping (TOML, keyword arguments); text is parsed, unknown names answered by the nearest."""
         owner = getattr(cls, "name", None) or cls.__name__
-        known = cls.parameters()
+        known = {**cls.parameters(), **cls.execution_options()}
         checked = {}
         for name, value in (values or {}).items():
             if name not in known:
@@ -198,6 +234,10 @@ class Parameterised:
     def values(self) -> dict[str, Any]:
         """Return the parameter values by name."""
         return {name: getattr(self, name) for name in self.parameters()}
+
+    def execution_values(self) -> dict[str, Any]:
+        """Return the values of the execution options by name."""
+        return {name: getattr(self, name) for name in self.execution_options()}
 
     def changed(self) -> dict[str, Any]:
         """Return the values that differ from their default."""

@@ -1,8 +1,10 @@
 """Detectors: what finds buildings in a scene.
 
-A *detector* is a frozen, keyword-only dataclass whose fields are its parameters; `Detector.detect` turns a scene into
-footprints. It sees measurements only (`Scene.for_detection`) and draws every random number from the generator it is
-given, so that the same seed gives the same footprints on any machine and with any number of workers.
+A *detector* is a frozen, keyword-only dataclass whose fields are its parameters and its execution options (see
+`core.parameters`): the number of threads, for instance, which changes the time and never the result.
+`Detector.detect` turns a scene into footprints. It sees measurements only (`Scene.for_detection`) and draws every
+random number from the generator it is given, so that the same seed gives the same footprints on any machine and with
+any number of workers.
 """
 
 from __future__ import annotations

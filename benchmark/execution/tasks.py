@@ -59,9 +59,9 @@ class Task:
         return json.dumps(
             {
                 "scene": self.scene.to_dict(),
-                "detector": self.detector.to_dict(),
+                "detector": self.detector.to_dict(execution=True),
                 "seed": self.seed,
-                "evaluators": [recipe.to_dict() for recipe in self.evaluators],
+                "evaluators": [recipe.to_dict(execution=True) for recipe in self.evaluators],
                 "codes": list(self.codes),
                 "describe_scene": self.describe_scene,
             }

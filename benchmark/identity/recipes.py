@@ -54,10 +54,14 @@ class PluginRecipe:
         Registered name, or ``path/to/file.py:Class``.
     parameters : mapping
         Every parameter with its value, defaults included.
+    execution : mapping
+        Execution options, such as the number of threads. They travel with the recipe to other processes, but are no
+        part of its identity: equal recipes may differ in them.
     """
 
     use: str
     parameters: Mapping[str, Any]
+    execution: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @classmethod
     def of(cls, plugin: Detector | Evaluator) -> Self:
@@ -66,9 +70,10 @@ class PluginRecipe:
         registry: Registry = DETECTORS if isinstance(plugin, Detector) else EVALUATORS
         module = sys.modules.get(kind.__module__)
         if kind.__module__.startswith("roofbench_plugin_") and module is not None and module.__file__:
-            return cls(f"{Path(module.__file__).resolve()}:{kind.__qualname__}", plugin.values())
+            use = f"{Path(module.__file__).resolve()}:{kind.__qualname__}"
+            return cls(use, plugin.values(), plugin.execution_values())
         if plugin.name in registry.names() and registry.get(plugin.name) is kind:
-            return cls(plugin.name, plugin.values())
+            return cls(plugin.name, plugin.values(), plugin.execution_values())
         raise UnsupportedError(
             f"{kind.__qualname__} cannot be made again in another process: put it into a file and select it as "
             f"file.py:{kind.__name__}, or run with jobs=0, in this process"
@@ -76,15 +81,16 @@ class PluginRecipe:
 
     def detector(self) -> Detector:
         """Return the detector."""
-        return make_detector(self.use, self.parameters)
+        return make_detector(self.use, {**self.parameters, **self.execution})
 
     def evaluator(self) -> Evaluator:
         """Return the evaluator."""
-        return make_evaluator(self.use, self.parameters)
+        return make_evaluator(self.use, {**self.parameters, **self.execution})
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what JSON holds."""
-        return {"use": self.use, "parameters": dict(self.parameters)}
+    def to_dict(self, *, execution: bool = False) -> dict[str, Any]:
+        """Return what JSON holds: the identity, and with `execution` also the execution options."""
+        identity = {"use": self.use, "parameters": dict(self.parameters)}
+        return {**identity, "execution": dict(self.execution)} if execution else identity
 
 
 @dataclass(frozen=True)

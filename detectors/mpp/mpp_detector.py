@@ -18,7 +18,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import ParameterError
-from ...core.parameters import parameter
+from ...core.parameters import execution_option, parameter
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.scene import Scene
 from ..base import Detector, Step
@@ -159,7 +159,7 @@ class MPP(Detector):
         0.5, minimum=1e-6, maximum=1, doc="p_f of the printed algorithm (equation 7); the paper gives no value"
     )
     iterations: int = parameter(30000, minimum=1, doc="T_m of the printed algorithm; the paper gives no value")
-    workers: int = parameter(1, minimum=1, doc="threads; they change the time, never the result")
+    threads: int = execution_option(1, minimum=1, doc="number of threads")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -232,7 +232,7 @@ class MPP(Detector):
         assert points is not None
         if not _are_many(points.z):
             return Footprints.empty(crs=scene.crs, source=self.name), None
-        with some_workers(self.workers) as workers:
+        with some_workers(self.threads) as workers:
             prepared = prepare(self, points, seen, workers)
             ready = time.perf_counter()
             if self.mode == "paper":

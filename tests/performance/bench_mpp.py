@@ -219,11 +219,11 @@ def threads(scenes, repeats):
         walls = {1: [], 2: []}
         spent = {1: [], 2: []}
         for count in (1, 2):
-            detect(scene, workers=count)
+            detect(scene, threads=count)
         for _ in range(repeats):
             for count in (1, 2):
                 began, cpu = time.perf_counter(), time.process_time()
-                detect(scene, workers=count)
+                detect(scene, threads=count)
                 walls[count].append(time.perf_counter() - began)
                 spent[count].append(time.process_time() - cpu)
         ratios = [one / two for one, two in zip(walls[1], walls[2], strict=True)]
@@ -258,7 +258,7 @@ def span(scenes, repeats):
         Workers.map = laid_out
         for _ in range(repeats):
             saved[0], began = 0.0, time.process_time()
-            detect(scene, workers=2)
+            detect(scene, threads=2)
             whole = time.process_time() - began
             rows.append((whole, whole - saved[0]))
         Workers.map = held

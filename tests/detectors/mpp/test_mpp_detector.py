@@ -75,9 +75,9 @@ def test_the_record_holds_the_convergence_as_json():
     assert sum(map(sum, trace["tried"].values())) == pytest.approx(trace["proposals"][-1])
 
 
-def test_same_seed_same_bits_with_any_number_of_workers_and_tiles_worked_off_in_any_order():
+def test_same_seed_same_bits_with_any_number_of_threads_and_tiles_worked_off_in_any_order():
     points = cloud(1)
-    small = "mpp[tile=40,largest_side=20,workers={}]"
+    small = "mpp[tile=40,largest_side=20,threads={}]"
     one = detect(points, small.format(1))
     assert len(one) >= 3
     assert wkb(one) == wkb(detect(points, small.format(2))) == wkb(detect(points, small.format(3)))
