@@ -205,7 +205,7 @@ def _floor(room: str) -> int:
 def _unit_floor(module: Module) -> int | None:
     """Return the floor of a module's unit in its room; None where the room has no floors."""
     floors = UNITS.get(module.room)
-    if floors is None or module.path.parent.name == module.room and module.is_package:
+    if floors is None or (module.path.parent.name == module.room and module.is_package):
         return None
     for level, floor in enumerate(floors):
         if module.unit in floor:

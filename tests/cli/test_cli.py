@@ -283,7 +283,7 @@ def test_files_are_written_before_a_table_that_nobody_reads(cli, misbehaving, tm
 def test_a_store_without_room_is_one_sentence(monkeypatch, tmp_path):
     import sqlite3
 
-    from command_line import roofbench
+    from harness.command_line import roofbench
 
     def full(*_):
         raise sqlite3.OperationalError("database or disk is full")

@@ -13,7 +13,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
-from command_line import roofbench
+from harness.command_line import roofbench
 
 import roofbench as rb
 

@@ -51,7 +51,7 @@ def test_a_full_disk_is_told_in_words_and_leaves_nothing(tmp_path):
 
 def test_points_that_find_no_room_are_told_in_words(tmp_path, monkeypatch):
     import laspy
-    import small_scenes
+    from builders import small_scenes
     from lazrs import LazrsError
 
     from roofbench.scenes.geodata.las_files import write_points

@@ -1,6 +1,6 @@
 """Speed and memory of the threshold-free evaluator.
 
-Run by hand: ``python tests/benchmarks/bench_evaluate.py [--sizes 1000,100000,1000000] [--repeats 3]``.
+Run by hand: ``python tests/performance/bench_evaluate.py [--sizes 1000,100000,1000000] [--repeats 3]``.
 
 Each size is a city of that many references (rectangles of 8 to 14 m at random angles on a 20 m lattice, one in ten
 with a wing under the same building id) against as many detections, shifted by 1 m on average, one in twenty missing

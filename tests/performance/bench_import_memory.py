@@ -1,4 +1,4 @@
-"""Peak memory and time of importing a large tile: ``python tests/benchmarks/bench_import_memory.py [MILLIONS]``.
+"""Peak memory and time of importing a large tile: ``python tests/performance/bench_import_memory.py [MILLIONS]``.
 
 Makes a LAZ file of 20 million points on 1 km2 (LAS 1.4, point format 6, terrain with houses), then reads and imports
 it in fresh processes and prints the peak resident memory beside the size that the points have unpacked as LAS.

@@ -1,6 +1,6 @@
 """Speed and memory of the line detectors.
 
-Run by hand: ``python tests/benchmarks/bench_lines.py [--scenes fairfield-1,fairfield] [--repeats 5]``.
+Run by hand: ``python tests/performance/bench_lines.py [--scenes fairfield-1,fairfield] [--repeats 5]``.
 
 Each detector runs on a synthetic scene that is already in memory, in one thread, after the kernels are compiled. CPU
 seconds, the median and the least of the repeats, in all and by stage; a stage is a call of one of the functions below,

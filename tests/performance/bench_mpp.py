@@ -1,6 +1,6 @@
 """Speed and memory of the marked point process: stages, proposals, quality against time, threads, bytes a cell.
 
-Run by hand: ``python tests/benchmarks/bench_mpp.py [stages] [moves] [budget] [threads] [span] [memory]`` (all
+Run by hand: ``python tests/performance/bench_mpp.py [stages] [moves] [budget] [threads] [span] [memory]`` (all
 without names), ``--scenes toronto-a,vaihingen-a --repeats 5 --plot docs/images/mpp-budget.png``, and
 ``--outline buildings`` for outlines along the cells as well.
 

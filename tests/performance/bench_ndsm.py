@@ -1,6 +1,6 @@
 """Speed and memory of the detector ndsm.
 
-Run by hand on scene folders: ``python tests/benchmarks/bench_ndsm.py delft ign [--repeats 5] [--tiled 4e6]``.
+Run by hand on scene folders: ``python tests/performance/bench_ndsm.py delft ign [--repeats 5] [--tiled 4e6]``.
 
 Each scene is measured in a process of its own: points, image and DEM are in memory, kernels are compiled by a first
 run. Reported are the medians of the CPU seconds of all threads, and by how much the detection raised the process's

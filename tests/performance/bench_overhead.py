@@ -1,4 +1,4 @@
-"""Measure what the framework adds to the detectors' time: ``python tests/benchmarks/bench_overhead.py [SECONDS]``.
+"""Measure what the framework adds to the detectors' time: ``python tests/performance/bench_overhead.py [SECONDS]``.
 
 A sweep of 5 parameters x 5 values x 10 scenes (250 runs) on two workers with a detector that computes for so many
 seconds (0.5). Counted in processor time, so that other work on the machine matters little: everything that this process

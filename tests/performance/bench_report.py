@@ -3,7 +3,7 @@
 Run by hand::
 
     roofbench run papers --store papers.sqlite
-    python tests/benchmarks/bench_report.py papers.sqlite
+    python tests/performance/bench_report.py papers.sqlite
 
 Prints processor and wall clock seconds of filling and of writing the page, and the page's size. Without a store it
 measures the large one alone, which is made here: scenes of a hamlet under changed names, detections of random boxes,

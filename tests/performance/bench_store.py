@@ -1,4 +1,4 @@
-"""Time listing and filtering of a store of 100 000 runs: ``python tests/benchmarks/bench_store.py``."""
+"""Time listing and filtering of a store of 100 000 runs: ``python tests/performance/bench_store.py``."""
 
 import resource
 import statistics

@@ -1,4 +1,4 @@
-"""Time the synthetic scene generator: ``python tests/benchmarks/bench_synthetic.py [PRESET ...]``.
+"""Time the synthetic scene generator: ``python tests/performance/bench_synthetic.py [PRESET ...]``.
 
 CPU seconds of one process, the least of three repeats after one for the compiler, and the peak memory of the process
 that makes everything once. Run it on an idle machine.

@@ -1,6 +1,6 @@
 """Compare synthetic scenes with the two real ones, by the same measurements on both.
 
-Run by hand: ``python tests/benchmarks/calibrate_synthetic.py [PICTURE.png]`` prints the table of docs/synthetic.md and
+Run by hand: ``python tests/performance/calibrate_synthetic.py [PICTURE.png]`` prints the table of docs/synthetic.md and
 draws its picture. The real scenes are looked for beside the repository (``../shared/scenes``) or in ROOFBENCH_SHARED.
 """
 

@@ -1,4 +1,4 @@
-"""Plant defects and let the gate find them, as a user would: ``python tests/benchmarks/gate_defects.py [FOLDER]``.
+"""Plant defects and let the gate find them, as a user would: ``python tests/performance/gate_defects.py [FOLDER]``.
 
 Runs ``roofbench baseline save`` and ``roofbench gate`` on the suite ``gate`` (thirty scenes), so the working tree must
 be clean. Prints what the gate prints and its exit code. Stored runs in FOLDER are used again.

@@ -1,4 +1,4 @@
-"""Gate detectors against themselves with fresh seeds: ``python tests/benchmarks/gate_identical.py [STORE]``.
+"""Gate detectors against themselves with fresh seeds: ``python tests/performance/gate_identical.py [STORE]``.
 
 A stochastic detector (``mpp``) on the scenes of the suite ``gate``: one baseline and fifty candidates, no seed used
 twice, with one and with five chains a scene; and 2 000 random pairs of a baseline and a candidate, for the share of

@@ -37,8 +37,8 @@ def read_runs(path: Path) -> dict[Pair, Run]:
     store = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
     try:
         rows = store.execute(
-            "SELECT runs.id, scenes.name, label, seed, status, content_hash FROM runs JOIN scenes ON scene_id = scenes.id"
-            " ORDER BY runs.id"
+            "SELECT runs.id, scenes.name, label, seed, status, content_hash"
+            " FROM runs JOIN scenes ON scene_id = scenes.id ORDER BY runs.id"
         )
         return {
             (scene, label, seed): Run(status, content, _values(store, run), _detections(store, run))
@@ -50,7 +50,8 @@ def read_runs(path: Path) -> dict[Pair, Run]:
 
 def _values(store: sqlite3.Connection, run: int) -> dict[tuple[str, str], float | None]:
     rows = store.execute(
-        "SELECT evaluator, index_values.name, value FROM evaluations JOIN index_values ON evaluation_id = evaluations.id"
+        "SELECT evaluator, index_values.name, value"
+        " FROM evaluations JOIN index_values ON evaluation_id = evaluations.id"
         " WHERE run_id = ? ORDER BY evaluations.id",
         (run,),
     )

@@ -1,6 +1,6 @@
 """The studies behind docs/line-detectors.md: pattern of results, what is lost where, ablation, sensitivity, pictures.
 
-Run by hand: ``python tests/benchmarks/study_lines.py STUDY [--seeds 1,2,3]``; ``--help`` names the studies.
+Run by hand: ``python tests/performance/study_lines.py STUDY [--seeds 1,2,3]``; ``--help`` names the studies.
 
 Tables go to standard output as Markdown, pictures to docs/images. Scenes are made once and kept in the folder named by
 ROOFBENCH_BENCH_SCENES (default: bench-scenes). Figures are means over scenes and seeds of the percentages of each.

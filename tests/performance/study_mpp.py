@@ -1,6 +1,6 @@
 """How the result of the marked point process moves: the tables and figures of docs/mpp.md.
 
-Run by hand: ``python tests/benchmarks/study_mpp.py ablation --folders delft,ign`` and the same with ``sensitivity``,
+Run by hand: ``python tests/performance/study_mpp.py ablation --folders delft,ign`` and the same with ``sensitivity``,
 ``points``, ``seeds``, ``ground``, ``detectors``, ``shapes`` or ``pictures``; figures go to docs/images.
 
 Small presets of one or two scene seeds and the real scenes in folders (one chain, or three). Q_l is object quality

@@ -1,6 +1,6 @@
 """How ndsm's quality depends on its cues, its parameters and the points it is given: the tables of docs/ndsm.md.
 
-Run by hand on scene folders: ``python tests/benchmarks/study_ndsm.py delft ign [--tables cues,parameters,points]``.
+Run by hand on scene folders: ``python tests/performance/study_ndsm.py delft ign [--tables cues,parameters,points]``.
 
 Reference footprints that touch (gaps below 0.1 m) are joined to blocks first. Each figure is in percent: pixel quality
 of the threshold-free evaluator (nearest matching, exact areas, evaluation area of the scene), and in brackets the

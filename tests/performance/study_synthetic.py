@@ -1,6 +1,6 @@
 """Pictures and difficulty curves of docs/synthetic.md.
 
-``python tests/benchmarks/study_synthetic.py pictures FOLDER [PRESET ...]`` draws presets; ``... curves FILE.png``
+``python tests/performance/study_synthetic.py pictures FOLDER [PRESET ...]`` draws presets; ``... curves FILE.png``
 prints and plots how the plain detector fares as one knob is turned, over ten seeds; ``... presets`` how on each preset.
 """
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from browser import chromium
-from report_builder import make_report
+from builders.report_builder import make_report
+from harness.browser import chromium
 
 from roofbench.reports.html_report import html_report
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-import small_scenes
-from command_line import run
+from builders import small_scenes
+from harness.command_line import run
 
 import roofbench as rb
 from roofbench.reports.scene_map import scene_figure

@@ -3,8 +3,8 @@ import json
 import numpy as np
 import pytest
 import shapely
-import small_scenes
-from command_line import run
+from builders import small_scenes
+from harness.command_line import run
 
 import roofbench as rb
 from roofbench.scenes.checking import check_scene

@@ -3,7 +3,7 @@ import shutil
 import numpy as np
 import pytest
 import shapely
-import small_scenes
+from builders import small_scenes
 
 import roofbench as rb
 from roofbench.core.errors import InputError, OutputError

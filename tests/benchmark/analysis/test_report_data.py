@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from command_line import roofbench
+from harness.command_line import roofbench
 
 import roofbench as rb
 from roofbench.benchmark.analysis.report_contents import fill_report, newest_runs

@@ -1,4 +1,4 @@
-from killed_sweeps import kill_and_resume
+from harness.killed_sweeps import kill_and_resume
 
 
 def test_a_sweep_killed_at_ten_random_moments_resumes_to_the_same_store(tmp_path):

@@ -1,10 +1,10 @@
 """Boxes: geometry, and sums inside them against counting every cell."""
 
-import naive_lines
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from naive import lines as naive_lines
 
 from roofbench.detectors.lines.boxes import box_centres, box_corners, lengths, prefix_sums, sum_in_box, widths
 

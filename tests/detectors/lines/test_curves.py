@@ -2,10 +2,10 @@
 
 import itertools
 
-import naive_lines
 import numpy as np
 import pytest
-from line_scenes import rectangle
+from builders.line_scenes import rectangle
+from naive import lines as naive_lines
 from shapely import contains_xy
 
 from roofbench.detectors.lines.boxes import OX, OY, UX, UY, lengths

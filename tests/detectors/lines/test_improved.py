@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from line_scenes import GREEN_ROOF, LEAVES, SceneBuilder, corners_off, rectangle
+from builders.line_scenes import GREEN_ROOF, LEAVES, SceneBuilder, corners_off, rectangle
 
 from roofbench.detectors.lines.improved import Improved
 from roofbench.detectors.lines.trace import Fate

@@ -1,8 +1,8 @@
 """Adjustment, extension, rectangles and dominant colours."""
 
-import naive_lines
 import numpy as np
 import pytest
+from naive import lines as naive_lines
 
 from roofbench.detectors.lines.adjustment import adjust_to_neighbours, adjust_to_shape, rotate
 from roofbench.detectors.lines.boxes import U0, U1, UX, UY, V0, V1, prefix_sums

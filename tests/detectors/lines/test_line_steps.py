@@ -3,7 +3,7 @@
 import matplotlib as mpl
 import numpy as np
 import pytest
-from line_scenes import GREEN_ROOF, SceneBuilder, rectangle
+from builders.line_scenes import GREEN_ROOF, SceneBuilder, rectangle
 from matplotlib.figure import Figure
 
 from roofbench.detectors.registry import make_detector

@@ -1,8 +1,8 @@
 """Masks and ground heights: what each point marks, and which height is its ground."""
 
-import naive_lines
 import numpy as np
 import pytest
+from naive import lines as naive_lines
 
 from roofbench.detectors.lines.masks import build_masks, ground_heights, point_spacing, sunken
 from roofbench.scenes.geodata.points import PointCloud

@@ -1,9 +1,9 @@
 """Entropy, image edges, votes and edge orientation histograms of the detector `improved`."""
 
-import naive_lines
 import numpy as np
 import pytest
-from line_scenes import rectangle
+from builders.line_scenes import rectangle
+from naive import lines as naive_lines
 from shapely import contains_xy
 
 from roofbench.detectors.lines.boxes import OX, OY, UX, UY, V0, V1, length_inside, lengths

@@ -1,8 +1,8 @@
 """What cells say: how large they are, and how their scores hold each other back."""
 
-import naive_mpp as naive
 import numpy as np
 import pytest
+from naive import mpp as naive
 
 from roofbench.detectors.mpp.background import Background, estimate_background, fitted_cells, mean_evidence, restrain
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, Cells, cell_size

@@ -1,8 +1,8 @@
 """Cells are those of the slow oracle, for any number of threads."""
 
-import naive_mpp
 import numpy as np
 import pytest
+from naive import mpp as naive_mpp
 
 from roofbench.detectors.mpp.cells import make_cells
 from roofbench.detectors.mpp.workers import some_workers

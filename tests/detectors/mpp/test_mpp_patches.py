@@ -1,10 +1,10 @@
 """Patches, their rims and what is eaten up and lowered are those of the slow oracles, for any number of threads."""
 
-import naive_mpp
-import naive_patches as naive
 import numpy as np
 import pytest
 import shapely
+from naive import mpp as naive_mpp
+from naive import patches as naive
 
 from roofbench.detectors.mpp.candidates import propose_boxes
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID

@@ -2,12 +2,12 @@
 
 import math
 
-import naive_mpp as naive
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from naive import mpp as naive
 
 from roofbench.detectors.mpp.energy import Model, configuration_energy, energy_below, least_energy, own_energy
 from roofbench.detectors.mpp.rectangles import corners, overlap_area

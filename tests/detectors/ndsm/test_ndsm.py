@@ -226,4 +226,6 @@ def test_steps_without_points_can_be_drawn():
 
     none = np.empty(0)
     for step in NDSM().steps(Scene("empty", EXTENT, points=PointCloud(none, none, none)), RNG):
-        step.draw(Figure())
+        figure = Figure()
+        step.draw(figure)
+        assert figure.axes, step.name

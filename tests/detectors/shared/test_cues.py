@@ -1,6 +1,6 @@
-import naive_cues
 import numpy as np
 import pytest
+from naive import cues as naive_cues
 
 from roofbench.detectors.shared.cues import cell_cues, greenness
 from roofbench.scenes.geodata.points import PointCloud

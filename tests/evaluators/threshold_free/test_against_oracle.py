@@ -1,10 +1,10 @@
 """The fast evaluator agrees with plain loops (naive.py) on a thousand random scenes."""
 
-import naive
 import numpy as np
 import pytest
 import shapely
-from random_sets import footprints_on_a_lattice, random_detections, random_reference
+from builders.footprint_sets import footprints_on_a_lattice, random_detections, random_reference
+from naive import evaluation as naive
 
 import roofbench as rb
 from roofbench.evaluators.threshold_free.evaluator import ThresholdFree

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 import shapely
+from builders.footprint_sets import random_detections, random_reference
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from random_sets import random_detections, random_reference
 from shapely import affinity
 
 import roofbench as rb

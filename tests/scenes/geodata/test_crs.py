@@ -33,7 +33,7 @@ def test_a_crs_has_a_short_name_for_people():
 
 @pytest.mark.parametrize("text", [None, "EPSG:25832", "EPSG:7415", UTM_WKT, "EPSG:25832+5783"])
 def test_metres_pass(text):
-    require_metric(text, "here")
+    assert require_metric(text, "here") is None
 
 
 @pytest.mark.parametrize(
@@ -51,8 +51,10 @@ def test_anything_else_is_refused(text, message):
         require_metric(text, "here")
 
 
-def test_footprints_have_no_heights():
-    require_metric("EPSG:25832+6360", "here", heights=False)
+def test_the_unit_of_heights_does_not_matter_to_footprints():
+    with pytest.raises(CRSError, match="its heights are in US survey foot"):
+        require_metric("EPSG:25832+6360", "here")
+    assert require_metric("EPSG:25832+6360", "here", heights=False) is None
 
 
 def test_two_inputs_must_share_their_crs():

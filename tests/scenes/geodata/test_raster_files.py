@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import rasterio
-import small_scenes
+from builders import small_scenes
 from rasterio import Affine
 from rasterio.enums import ColorInterp
 

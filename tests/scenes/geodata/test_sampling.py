@@ -1,6 +1,6 @@
-import naive_sampling
 import numpy as np
 import pytest
+from naive import sampling as naive_sampling
 
 from roofbench.scenes.geodata.raster import Elevation, Grid
 

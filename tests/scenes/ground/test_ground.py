@@ -1,6 +1,6 @@
-import naive_ground
 import numpy as np
 import pytest
+from naive import ground as naive_ground
 from shapely import box, contains_xy
 from shapely.affinity import rotate
 

@@ -7,9 +7,9 @@ import pyproj
 import pytest
 import rasterio
 import shapely
-import small_scenes
-from command_line import run
-from copc_files import write_copc
+from builders import small_scenes
+from builders.copc_files import write_copc
+from harness.command_line import run
 from rasterio import Affine
 
 import roofbench as rb

@@ -1,7 +1,7 @@
 """Kill a sweep at random moments, resume it, and compare the store with that of an uninterrupted one.
 
 The test suite does it with ten moments; by hand, with others every time:
-``python tests/benchmark/killed_sweeps.py 10``.
+``python -m tests.harness.killed_sweeps 10``.
 """
 
 import os
@@ -16,7 +16,7 @@ from pathlib import Path
 
 from roofbench.benchmark.store.writer import Store
 
-PLUGIN = f"{Path(__file__).parents[2] / 'plugins' / 'misbehaving.py'}:Misbehaving"
+PLUGIN = f"{Path(__file__).parents[1] / 'plugins' / 'misbehaving.py'}:Misbehaving"
 
 
 def start_sweep(store, jobs, sides):

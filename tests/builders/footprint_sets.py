@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import shapely
-from naive import rectangle
+from naive.evaluation import rectangle
 from shapely import affinity
 
 

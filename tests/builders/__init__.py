@@ -1,0 +1,1 @@
+"""Inputs made for tests: scenes, files, footprint sets and reports."""

@@ -1,0 +1,1 @@
+"""How tests drive the program: the command line, a browser, processes that are killed."""

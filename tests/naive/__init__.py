@@ -1,0 +1,1 @@
+"""Slow, obvious oracles: what each fast kernel must compute, in plain loops."""
