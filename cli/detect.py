@@ -74,6 +74,8 @@ def detect(
         seconds = time.process_time() - started
         write_footprints(found, output, overwrite=overwrite)
         if not quiet:
+            for note in found.metadata.get("notes", ()):
+                typer.echo(f"note: {place.name}: {note}", err=True)
             typer.echo(f"{output}: {len(found)} footprints on {place.name} in {seconds:.2f} CPU seconds", err=True)
     if steps is not None:
         count = _write_steps(chosen, place, seed, steps, overwrite)

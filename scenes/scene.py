@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -18,6 +18,9 @@ from ..core.errors import InputError, MissingInputError
 from .geodata.footprints import Footprints
 from .geodata.points import PointCloud
 from .geodata.raster import Elevation, Grid, Image
+
+if TYPE_CHECKING:
+    from .ground.heights import Heights
 
 __all__ = ["Scene"]
 
@@ -78,6 +81,8 @@ class Scene:
             "area": area,
         }
         self._content_hash = content_hash
+        self._heights: Heights | None = None
+        self._is_for_detection = False
 
     @property
     def holdings(self) -> tuple[str, ...]:
@@ -110,6 +115,21 @@ class Scene:
         """Bare-earth elevation, or None."""
         value: Elevation | None = self._get("dem")
         return value
+
+    @property
+    def heights(self) -> Heights:
+        """Heights above ground: the DEM where it is known, elsewhere the ground filter; computed at first use."""
+        if self._heights is None:
+            # The ground filter is compiled code, which takes a while to load.
+            from .ground.heights import heights_of
+
+            self._heights = heights_of(self.points, self.dem, self.extent)
+        return self._heights
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was estimated because the scene does not hold it, one sentence each; empty until it is used."""
+        return self._heights.notes if self._heights is not None else ()
 
     @property
     def reference(self) -> Footprints | None:
@@ -160,14 +180,19 @@ class Scene:
             raise MissingInputError(reason)
 
     def for_detection(self) -> Scene:
-        """Return the scene as a detector may see it: no reference, no area, no classification, no generator facts."""
+        """Return the scene as a detector may see it: no reference, no area, no classification, no generator facts.
+
+        Such a scene returns itself.
+        """
+        if self._is_for_detection:
+            return self
 
         def points() -> PointCloud | None:
             cloud = self.points
             return None if cloud is None else cloud.unclassified()
 
         held = self._sources
-        return Scene(
+        seen = Scene(
             self.name,
             self.extent,
             crs=self.crs,
@@ -176,6 +201,8 @@ class Scene:
             dem=(lambda: self.dem) if held["dem"] is not None else None,
             content_hash=lambda: self.content_hash,
         )
+        seen._is_for_detection = True
+        return seen
 
     def _digest(self) -> str:
         digest = hashlib.sha256(repr((self.extent, self.crs)).encode())

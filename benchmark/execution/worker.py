@@ -39,7 +39,10 @@ def detect(scene: Scene, detector: Detector, *, seed: int = 0) -> Footprints:
     """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector."""
     visible = scene.for_detection()
     visible.require(detector.requires)
-    return checked_output(detector.detect(visible, random_stream(seed, scene, detector)), scene, detector.name)
+    found = checked_output(detector.detect(visible, random_stream(seed, scene, detector)), scene, detector.name)
+    # What was estimated for lack of a DEM goes where the footprints go: to the screen, the store, the caller.
+    notes = {"notes": list(visible.notes)} if visible.notes else {}
+    return dataclasses.replace(found, metadata={**found.metadata, **notes})
 
 
 def random_stream(seed: int, scene: Scene, detector: Detector) -> np.random.Generator:

@@ -59,7 +59,7 @@ _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
 class LineDetector(Detector):
     """Parameters and shared steps of the detectors `original` and `improved`."""
 
-    requires: ClassVar[tuple[str, ...]] = ("points", "colour", "dem")
+    requires: ClassVar[tuple[str, ...]] = ("points", "colour")
 
     ground: str = parameter(
         "tile-dem",
@@ -321,9 +321,8 @@ class LineDetector(Detector):
         grid = image.grid
         tile_side = self.tile_size * PAPER_PIXEL
         spacing = point_spacing(points, grid)
-        ground = (
-            ground_heights(points, scene.dem, method=self.ground, tile_side=tile_side) if len(points) else np.empty(0)
-        )
+        surface = None if self.ground == "tile-mode" or not len(points) else scene.heights.ground
+        ground = ground_heights(points, surface, method=self.ground, tile_side=tile_side)
         if self.ground == "point-dem" and self.below_ground < 1 and len(points):
             ground += sunken(points, ground, self.below_ground)
         masks = build_masks(

@@ -135,38 +135,28 @@ def _tile_mode(points: PointCloud, side: float) -> NDArray[np.float64]:
     return np.asarray(((modes + lowest + 0.5) * _HEIGHT_BIN)[index], dtype=np.float64)
 
 
-def _point_dem(points: PointCloud, dem: Elevation) -> NDArray[np.float64]:
-    heights = dem.sample(points.x, points.y)
-    unknown = np.isnan(heights)
-    if unknown.any():
-        known = np.isfinite(dem.values)
-        window = (11, 11)
-        weight = cv2.blur(known.astype(np.float32), window, borderType=cv2.BORDER_CONSTANT)
-        mean = cv2.blur(np.where(known, dem.values, 0).astype(np.float32), window, borderType=cv2.BORDER_CONSTANT)
-        overall = float(dem.values[known].mean(dtype=np.float64))
-        filled = np.where(weight > 1e-6, mean / np.maximum(weight, np.float32(1e-6)), np.float32(overall))
-        filled = np.where(known, dem.values, filled).astype(np.float32)
-        heights[unknown] = Elevation(filled, dem.grid).sample(points.x[unknown], points.y[unknown])
-    return heights
-
-
-def ground_heights(points: PointCloud, dem: Elevation | None, *, method: str, tile_side: float) -> NDArray[np.float64]:
+def ground_heights(
+    points: PointCloud, ground: Elevation | None, *, method: str, tile_side: float
+) -> NDArray[np.float64]:
     """Return the ground height under each point, metres, shape (n,).
 
     Parameters
     ----------
+    points : PointCloud
+    ground : Elevation, optional
+        The scene's ground; the mode of the points needs none.
     method : {"tile-dem", "tile-mode", "point-dem"}
         Mean DEM of the point's tile (2010, section 3.2); most frequent 2 m height bin of the tile's points (conference
-        version); DEM under the point, where unknown its neighbourhood (2011, section 3.1).
+        version); ground under the point (2011, section 3.1).
     tile_side : float
         Metres.
     """
+    if not len(points):
+        return np.empty(0)
     if method == "tile-mode":
         return _tile_mode(points, tile_side)
-    assert dem is not None
-    if not np.isfinite(dem.values).any():
-        return np.full(len(points), np.nan)
-    return _tile_dem(points, dem, tile_side) if method == "tile-dem" else _point_dem(points, dem)
+    assert ground is not None
+    return _tile_dem(points, ground, tile_side) if method == "tile-dem" else ground.sample(points.x, points.y)
 
 
 def sunken(points: PointCloud, ground: NDArray[np.float64], share: float) -> NDArray[np.float64]:

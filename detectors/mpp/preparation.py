@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import ParameterError
 from ...scenes.geodata.points import PointCloud
-from ...scenes.geodata.raster import Elevation, Grid
-from ...scenes.ground.filter import fill_unknown, ground_surface
+from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from .background import Background, estimate_background, fitted_cells, score_cells, textures
 from .candidates import propose_boxes
@@ -112,12 +111,8 @@ def _classes(
     parameters: MPP, points: PointCloud, scene: Scene, cell: float, workers: Workers
 ) -> tuple[Background, NDArray[np.int32], NDArray[np.uint8], NDArray[np.int16], NDArray[np.bool_]]:
     """Return the classes of the scene, and height, state, score and whether it is fitted of each cell."""
-    if scene.dem is not None:
-        ground = Elevation(fill_unknown(scene.dem.values), scene.dem.grid)
-    else:
-        ground = ground_surface(points, scene.extent)
     low = 0.8 * parameters.least_height
-    cells = make_cells(points, ground, Grid.covering(scene.extent, cell), low=low, workers=workers)
+    cells = make_cells(points, scene.heights.ground, Grid.covering(scene.extent, cell), low=low, workers=workers)
     background, bins = estimate_background(cells, workers=workers)
     fitted = _fitted(parameters, cells, bins, background, workers)
     if parameters.carried_share <= 1:

@@ -1,7 +1,6 @@
 """The plain baseline: what is high, not a tree, and large enough, is a building.
 
-1. Points are gathered on a grid as fine as their spacing allows; heights are above the DEM, else above a ground
-   surface filtered from the points.
+1. Points are gathered on a grid as fine as their spacing allows; heights are those of the scene (`Scene.heights`).
 2. A cell is *high* where at least half of its points are above the height threshold.
 3. Each cue that the scene offers (multiple returns, roughness, penetration, image vegetation) says between -1 (roof)
    and +1 (tree) how a cell looks; the mean is averaged over the neighbourhood, and a high cell where it is negative is
@@ -28,7 +27,7 @@ from ...core.parameters import parameter
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
-from ...scenes.ground.heights import ground_of, heights_above_ground
+from ...scenes.ground.heights import heights_of
 from ...scenes.scene import Scene
 from ..base import Detector, Step
 from ..shared.cues import CellCues, cell_cues, greenness
@@ -65,7 +64,7 @@ class NDSM(Detector):
     cell: float | None = parameter(
         None, unit="m", minimum=0.1, maximum=5, doc="cell size; none: 1.4 times the point spacing, 0.25 to 2 m"
     )
-    dem: bool = parameter(True, doc="take the ground from the DEM where there is one; false: always from the points")
+    dem: bool = parameter(True, doc="take the ground from the DEM where it is known; false: always from the points")
     multiple_share: float | None = parameter(
         0.5, minimum=0, maximum=1, doc="share of multiple returns from which on a cell looks like a tree; none: unused"
     )
@@ -139,7 +138,8 @@ class NDSM(Detector):
         assert scene.points is not None
         # Three points that are there twice lie in one plane like six of a roof.
         points = scene.points.distinct()
-        heights = heights_above_ground(points, ground_of(scene, use_dem=self.dem))
+        ground = scene.heights if self.dem else heights_of(scene.points, None, scene.extent)
+        heights = ground.above(points)
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
         high = np.nan_to_num(cues.high_share) >= 0.5

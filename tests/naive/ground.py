@@ -1,4 +1,4 @@
-"""Slow obvious oracles of the lowest supported point per cell and of the mean near a surface."""
+"""Slow obvious oracles of the lowest supported point per cell, the mean near a surface and the seam of a DEM."""
 
 import numpy as np
 
@@ -28,3 +28,15 @@ def mean_above(x, y, z, surface, tolerance):
             if held.any():
                 mean[r, c] = above[held].mean()
     return mean
+
+
+def fading(known, cell, seam):
+    """Weight of the difference between DEM and filter: 1 where the DEM is known, smoothly 0 from `seam` metres on."""
+    places = np.argwhere(known)
+    weight = np.zeros(known.shape)
+    for row in range(known.shape[0]):
+        for column in range(known.shape[1]):
+            distance = np.sqrt(((places - (row, column)) ** 2).sum(axis=1).min()) * cell
+            left = max(0.0, 1 - distance / seam)
+            weight[row, column] = left * left * (3 - 2 * left)
+    return weight

@@ -28,7 +28,6 @@ import roofbench as rb
 
 STAGES = {
     "cell size": ("preparation", "cell_size"),
-    "ground surface (no DEM)": ("preparation", "ground_surface"),
     "points to cells": ("preparation", "make_cells"),
     "classes by EM, textures": ("preparation", "estimate_background"),
     "textures again": ("preparation", "textures"),

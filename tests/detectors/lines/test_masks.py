@@ -136,13 +136,6 @@ def test_the_mode_of_a_tile_is_the_middle_of_its_fullest_two_metre_bin():
     assert ground_heights(points, None, method="tile-mode", tile_side=10.0).tolist() == [11.0] * 4
 
 
-def test_where_the_elevation_is_unknown_its_neighbourhood_stands_in():
-    values = np.full((20, 20), 7.0, np.float32)
-    values[8:12, 8:12] = np.nan
-    dem = Elevation(values, Grid(0.0, 20.0, 1.0, 20, 20))
-    assert ground_heights(cloud([10], [10], [0]), dem, method="point-dem", tile_side=1.0) == pytest.approx([7.0])
-
-
 def house_on_a_pad(seed=3):
     """A slope of 12 % with a level pad cut into it; a DEM that knows only the slope; points 1 m apart, and a house."""
     rng = np.random.default_rng(seed)

@@ -98,14 +98,11 @@ def test_the_same_scene_gives_the_same_bits():
     assert shapely.to_wkb(first.polygons).tolist() == shapely.to_wkb(second.polygons).tolist()
 
 
-def test_no_building_no_point_and_no_known_elevation_give_an_empty_result():
+def test_no_building_and_no_point_give_an_empty_result():
     bare = SceneBuilder().build()
     assert len(detect(bare)) == 0
     nothing = PointCloud(np.empty(0), np.empty(0), np.empty(0))
     assert len(detect(Scene("empty", bare.extent, points=nothing, image=bare.image, dem=bare.dem))) == 0
-    house = SceneBuilder().house(rectangle(30, 30, 15, 10)).build()
-    unknown = Elevation(np.full((60, 60), np.nan, np.float32), house.dem.grid)
-    assert len(detect(Scene("blind", house.extent, points=house.points, image=house.image, dem=unknown))) == 0
 
 
 def test_a_house_cut_by_the_border_of_the_points_makes_no_line_along_the_border():
