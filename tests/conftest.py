@@ -1,9 +1,14 @@
+"""Fixtures for all rooms, and the profile of the property tests."""
+
 from pathlib import Path
 
 import pytest
+from harness.effort import use_profile
 
 from roofbench.benchmark.execution.tasks import Task
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
+
+use_profile()
 
 MISBEHAVING = f"{Path(__file__).parent / 'plugins' / 'misbehaving.py'}:Misbehaving"
 

@@ -2,7 +2,8 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from harness.effort import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from roofbench.benchmark.analysis.inference import (
@@ -26,7 +27,7 @@ def test_the_sign_flip_test_is_the_enumeration_of_all_signs(differences):
     assert paired_p(differences) == pytest.approx(naive_sign_flip(differences) if any(differences) else 1.0)
 
 
-@settings(max_examples=30, deadline=None)  # half a million sums each
+@examples(30)  # half a million sums each
 @given(st.lists(st.sampled_from([0, 0, 0, 1, -1, 7, -900, 4095, -4096]), min_size=16, max_size=18))
 def test_many_differences_are_judged_as_by_enumeration(differences):
     differences = [4096, *differences]  # the largest is the unit of the lattice

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from harness.effort import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from naive import lines as naive_lines
 
@@ -17,7 +18,7 @@ def make_box(x, y, angle, length, width):
     return np.array([x, y, np.cos(angle), np.sin(angle), -length / 3, length * 2 / 3, -width / 4, width * 3 / 4])
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(places, places, angles, sizes, sizes)
 def test_the_sum_in_a_box_is_the_sum_over_its_cells(x, y, angle, length, width):
     raster = np.random.default_rng(0).integers(0, 256, (40, 47), dtype=np.uint8)

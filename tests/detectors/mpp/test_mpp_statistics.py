@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from harness.effort import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from naive import mpp as naive
 
@@ -160,7 +161,7 @@ def test_a_nested_rectangle_shares_its_whole_area_and_touching_ones_nothing():
     assert overlap_area(np.array([0.0, 0, 4, 4, 0]), np.array([4.0, 0, 4, 4, 0])) == pytest.approx(0, abs=1e-12)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(seed=st.integers(0, 2**32 - 1), down=st.integers(0, 7), right=st.integers(0, 9))
 def test_energy_does_not_change_with_shift_by_cells_quarter_turn_or_mirror(seed, down, right):
     rng = np.random.default_rng(seed)

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from harness.effort import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from shapely.affinity import rotate
 
@@ -33,7 +34,7 @@ def iou(one, two):
     return one.intersection(two).area / one.union(two).area
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(seed=st.integers(0, 10_000))
 def test_an_outline_encloses_exactly_the_centres_of_the_mask(seed):
     mask = np.random.default_rng(seed).random(GRID.shape) < 0.6
@@ -85,7 +86,7 @@ def test_a_round_tower_is_not_squared():
     assert iou(regular, tower) > 0.9
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(seed=st.integers(0, 10_000))
 def test_regularised_outlines_are_valid_and_agree_with_what_was_traced(seed):
     rng = np.random.default_rng(seed)

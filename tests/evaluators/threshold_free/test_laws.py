@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import shapely
 from builders.footprint_sets import random_detections, random_reference
-from hypothesis import assume, given, settings
+from harness.effort import examples
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from shapely import affinity
 
@@ -14,7 +15,7 @@ import roofbench as rb
 from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
 
 seeds = st.integers(0, 10**6)
-laws = settings(max_examples=60, deadline=None, derandomize=True)
+laws = examples(60)
 
 
 def scene(seed, *, general=True):

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from harness.effort import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from shapely import Polygon, affinity, box
 
@@ -122,7 +123,7 @@ sides = st.floats(5, 40)
 
 
 @given(sides, sides, sides, sides, st.floats(0, 90), st.integers(0, 3))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_two_crossing_rectangles_are_found_again(width, depth, arm, thickness, angle, corner):
     shape = shapely.union(box(0, 0, width, depth), box(0, 0, min(thickness, width), depth + arm))
     turned = affinity.rotate(affinity.rotate(shape, 90 * corner), angle)
@@ -130,7 +131,7 @@ def test_two_crossing_rectangles_are_found_again(width, depth, arm, thickness, a
 
 
 @given(st.floats(0, 360), st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
-@settings(max_examples=30, deadline=None)
+@examples(30)
 def test_turning_and_moving_changes_nothing(angle, east, north):
     turned = affinity.translate(affinity.rotate(SHAPES["T"][0], angle), east, north)
     parts = decompose(turned)
