@@ -32,6 +32,13 @@ NUMERICAL_ZERO = 1e-6
 
 _CHUNK = 1 << 18
 
+#: From so many pairs on, areas come from compiled fans: general outlines, and pairs of all kinds. Below, loading the
+#: compiled code takes longer than what it saves.
+_MANY_OUTLINES, _MANY_ALL = 10_000, 200_000
+
+#: A fan costs the product of the numbers of vertices; beyond so many an overlay is faster.
+_LARGEST_FAN = 1 << 18
+
 #: Most pairs of footprints whose bounds meet: 5 GB and two minutes. A city has ten for each of its buildings.
 _MOST_PAIRS = 5e7
 
@@ -116,10 +123,12 @@ def shared_areas(
     one: Footprints, two: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Return the area that footprint `first` of one set shares with `second` of the other, m2, shape (n,)."""
-    areas = np.empty(len(first))
     row_one, row_two = quadrilateral_rows(one)[first], quadrilateral_rows(two)[second]
-    corners_one, corners_two = one.quadrilaterals[1], two.quadrilaterals[1]
     convex = (row_one >= 0) & (row_two >= 0)
+    if len(first) > _MANY_ALL or np.count_nonzero(~convex) > _MANY_OUTLINES:
+        return _fanned(one, two, first, second)
+    areas = np.empty(len(first))
+    corners_one, corners_two = one.quadrilaterals[1], two.quadrilaterals[1]
     for start in range(0, len(first), _CHUNK):
         part = slice(start, start + _CHUNK)
         quick = np.flatnonzero(convex[part]) + start
@@ -129,6 +138,23 @@ def shared_areas(
         areas[quick[~same]] = convex_intersection_areas(sides[0][~same], sides[1][~same])
         slow = np.flatnonzero(~convex[part]) + start
         areas[slow] = _overlay_areas(one.polygons, two.polygons, first[slow], second[slow])
+    return areas
+
+
+def _fanned(
+    one: Footprints, two: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return shared areas by fans, and by overlay where both outlines have very many vertices."""
+    from .fans import fan_areas, outlines_of  # compiled code: a comparison of small files does without
+
+    cost = np.diff(one.rings[0])[first] * np.diff(two.rings[0])[second]
+    small = cost <= _LARGEST_FAN
+    sides = outlines_of(one), outlines_of(two)
+    if small.all():
+        return fan_areas(*sides, first, second)
+    areas = np.empty(len(first))
+    areas[small] = fan_areas(*sides, first[small], second[small])
+    areas[~small] = _overlay_areas(one.polygons, two.polygons, first[~small], second[~small])
     return areas
 
 

@@ -235,6 +235,30 @@ class Footprints:
         return candidates[convex], np.ascontiguousarray(corners[convex])
 
     @cached_property
+    def rings(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Start of each footprint in the rows of points, shape (n + 1,), and points, shape (m, 2), metres.
+
+        The rings of a footprint are closed and follow each other, separated by a row of NaN. Where there are several,
+        exteriors run counter-clockwise and holes clockwise; a single one runs as it was given.
+        """
+        single = (shapely.get_type_id(self.polygons) == 3) & (shapely.get_num_interior_rings(self.polygons) == 0)
+        counts = shapely.get_num_coordinates(self.polygons).astype(np.int64)
+        several: dict[int, NDArray[np.float64]] = {}
+        gap = np.full((1, 2), np.nan)
+        for row in np.flatnonzero(~single).tolist():
+            rings = shapely.get_rings(shapely.get_parts(shapely.orient_polygons(self.polygons[row])))
+            several[row] = np.concatenate([part for ring in rings for part in (gap, shapely.get_coordinates(ring))][1:])
+            counts[row] = len(several[row])
+        start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        points = np.empty((start[-1], 2))
+        of_single = np.ones(len(points), dtype=bool)
+        for row, rows in several.items():
+            points[start[row] : start[row + 1]] = rows
+            of_single[start[row] : start[row + 1]] = False
+        points[of_single] = shapely.get_coordinates(self.polygons[single])
+        return start, points
+
+    @cached_property
     def centres(self) -> NDArray[np.float64]:
         """Centre of each footprint, shape (n, 2), metres (2010 paper, section 4.1)."""
         centres = np.empty((len(self), 2))
