@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from .benchmark.session import detect, run
     from .core.errors import RoofbenchError
     from .core.parameters import execution_option, parameter
-    from .detectors.base import Detector, Step
+    from .detectors.base import Detector
     from .detectors.registry import make_detector
+    from .detectors.steps import Step
     from .evaluators.base import Evaluation, Evaluator, Index
     from .evaluators.comparison import evaluate, pool
     from .evaluators.registry import make_evaluator

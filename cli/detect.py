@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from ..evaluators.base import Evaluator
     from ..scenes.scene import Scene
 
-#: Names in a folder of steps.
-_STEPS = ("README.md", "[0-9][0-9]-*.png")
-
 
 def detect(
     detector: Annotated[str, typer.Argument(help="NAME, 'NAME[parameter=value,...]' or FILE.py:CLASS.")],
@@ -44,7 +41,7 @@ def detect(
 
     from ..benchmark.execution.worker import detect as run_detector
     from ..benchmark.suite import scenes_of
-    from ..core.output import check_folder, check_target
+    from ..core.output import check_target
     from ..detectors.registry import make_detector
     from ..scenes.geodata.vector_files import output_driver, write_footprints
 
@@ -62,7 +59,9 @@ def detect(
         check_target(output, overwrite)
         output_driver(output)
     if steps is not None:
-        check_folder(steps, overwrite, holds=_STEPS)
+        from ..reports.steps.step_folder import check_step_folder
+
+        check_step_folder(steps, overwrite=overwrite)
     (recipe,) = scenes_of([scene])
     place = recipe.open()
     if Path(scene).exists():
@@ -84,24 +83,14 @@ def detect(
 
 
 def _write_steps(detector: Detector, scene: Scene, seed: int, folder: Path, overwrite: bool) -> int:
-    from matplotlib.figure import Figure
-
     from ..benchmark.execution.worker import random_stream
-    from ..core.output import whole_folder
-    from ..reports.figures import save_figure
+    from ..reports.steps.step_folder import write_steps
 
-    captions = []
-    with whole_folder(folder, holds=_STEPS, overwrite=overwrite) as scratch:
-        visible = scene.for_detection()
-        visible.require(detector.requires)
-        with _failures_told(detector, scene):
-            for step in detector.steps(visible, random_stream(seed, scene, detector)):
-                figure = Figure(figsize=(8, 8), layout="constrained")
-                step.draw(figure)
-                save_figure(figure, scratch / f"{step.name}.png", tight=True)
-                captions.append(f"- `{step.name}.png`: {step.caption}\n")
-        (scratch / "README.md").write_text(f"# {detector.name} on {scene.name}\n\n" + "".join(captions), "utf-8")
-    return len(captions)
+    visible = scene.for_detection()
+    visible.require(detector.requires)
+    with _failures_told(detector, scene):
+        steps = detector.steps(visible, random_stream(seed, scene, detector))
+        return write_steps(steps, folder, title=f"{detector.name} on {scene.name}", overwrite=overwrite)
 
 
 @contextmanager

@@ -27,7 +27,7 @@ HOMES = {
     "PointCloud": "scenes.geodata.points",
     "RoofbenchError": "core.errors",
     "Scene": "scenes.scene",
-    "Step": "detectors.base",
+    "Step": "detectors.steps",
     "detect": "benchmark.session",
     "evaluate": "evaluators.comparison",
     "execution_option": "core.parameters",

@@ -10,9 +10,8 @@ any number of workers.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Iterator
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,30 +19,9 @@ from ..core.errors import UnsupportedError
 from ..core.parameters import Parameterised
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
+from .steps import Step
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["Detector", "Step"]
-
-
-@dataclass(frozen=True)
-class Step:
-    """One intermediate result that a person can look at.
-
-    Attributes
-    ----------
-    name : str
-        Short, fit for a file name: ``"03-lines"``.
-    caption : str
-        One sentence that says what is seen.
-    draw : callable
-        Draws it on an empty matplotlib figure.
-    """
-
-    name: str
-    caption: str
-    draw: Callable[[Figure], None]
+__all__ = ["Detector"]
 
 
 class Detector(Parameterised, ABC):
@@ -75,5 +53,8 @@ class Detector(Parameterised, ABC):
         return ""
 
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
-        """Yield the intermediate results of the same detection, for ``roofbench detect --steps``."""
+        """Yield the intermediate results of the same detection as data (`detectors.steps`); nothing is drawn here.
+
+        ``roofbench detect --steps`` draws them.
+        """
         raise UnsupportedError(f"the detector {self.name!r} shows no intermediate steps")

@@ -17,11 +17,11 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image as Bitmap
 
-from ..detectors.scale_bar import add_scale_bar
 from .inline_svg import shortened
+from .map_elements import add_scale_bar, polygon_paths
 from .report_data import Overlay, SceneView, Side
 from .scene_picture import ScenePicture
-from .verdict_map import VERDICT_STYLE, outlines
+from .verdict_map import VERDICT_STYLE
 
 __all__ = ["overlay_figure"]
 
@@ -73,7 +73,7 @@ def _pale(picture: ScenePicture) -> NDArray[np.float64]:
 
 def _draw(axes: Axes, view: SceneView, overlay: Overlay) -> None:
     axes.add_collection(
-        PathCollection(list(outlines(view.polygons)), facecolor="none", edgecolor="black", linewidth=0.7)
+        PathCollection(list(polygon_paths(view.polygons)), facecolor="none", edgecolor="black", linewidth=0.7)
     )
     sides: tuple[tuple[Side, Any, tuple[str, ...]], ...] = (
         (overlay.references, view.polygons, ("FN",)),
@@ -86,11 +86,11 @@ def _draw(axes: Axes, view: SceneView, overlay: Overlay) -> None:
             colour, hatch, _ = VERDICT_STYLE[verdict]
             face = to_rgba(colour, 0.3 if hatch else 0.5)
             axes.add_collection(
-                PathCollection(list(outlines(mine)), facecolor=face, edgecolor=colour, hatch=hatch, linewidth=1.0)
+                PathCollection(list(polygon_paths(mine)), facecolor=face, edgecolor=colour, hatch=hatch, linewidth=1.0)
             )
     if view.area is not None and shapely.area(view.area) > 0:
         axes.add_collection(
-            PathCollection(list(outlines([view.area])), facecolor="none", edgecolor="#333333", linestyle="--")
+            PathCollection(list(polygon_paths([view.area])), facecolor="none", edgecolor="#333333", linestyle="--")
         )
 
 

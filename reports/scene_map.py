@@ -19,12 +19,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..detectors.scale_bar import add_scale_bar
 from ..scenes.geodata.crs import crs_label
 from ..scenes.geodata.raster import Elevation, Grid
 from ..scenes.geodata.surfaces import highest_surface, mean_intensity
 from ..scenes.scene import Scene
-from .verdict_map import outlines
+from .map_elements import add_scale_bar, polygon_paths
 
 __all__ = ["scene_figure"]
 
@@ -136,13 +135,13 @@ def _draw_reference(axes: Axes, scene: Scene, surface: Elevation | None) -> None
     title = "No reference"
     if scene.reference is not None:
         fill = to_rgba(_REFERENCE, 0.3)
-        shapes = list(outlines(scene.reference.polygons))
+        shapes = list(polygon_paths(scene.reference.polygons))
         axes.add_collection(PathCollection(shapes, facecolor=fill, edgecolor=_REFERENCE, linewidth=0.7))
         buildings = len(np.unique(scene.reference.building_codes))
         title = f"Reference: {len(scene.reference)} footprints, {buildings} building{'s' * (buildings != 1)}"
         handles.append(Patch(facecolor=fill, edgecolor=_REFERENCE, label="reference"))
     if scene.area is not None:
-        border = list(outlines([scene.area]))
+        border = list(polygon_paths([scene.area]))
         axes.add_collection(PathCollection(border, facecolor="none", edgecolor=_AREA, linewidth=1.4))
         handles.append(Line2D([], [], color=_AREA, lw=1.4, label="evaluation area"))
     axes.set_title(title, fontsize=9)

@@ -6,7 +6,6 @@ Colours are those of Okabe & Ito, told apart by people who see red and green ali
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,17 +14,16 @@ from matplotlib.collections import PathCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
-from ..detectors.scale_bar import add_scale_bar
 from ..evaluators.base import Evaluation, Verdicts
 from .evaluation_text import described, format_value
+from .map_elements import add_scale_bar, polygon_paths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["VERDICT_STYLE", "draw_verdicts", "outlines", "verdict_figure"]
+__all__ = ["VERDICT_STYLE", "draw_verdicts", "verdict_figure"]
 
 #: Verdict to (colour, hatch, what it means).
 VERDICT_STYLE = {
@@ -125,31 +123,19 @@ def draw_verdicts(
     matched = references["geometry"].to_numpy()[(references["verdict"] == "TP").to_numpy()]
     if len(matched):
         visible = matched[shapely.intersects(matched, window)]
-        axes.add_collection(PathCollection(list(outlines(visible)), facecolor="none", edgecolor="black", linewidth=0.7))
+        axes.add_collection(
+            PathCollection(list(polygon_paths(visible)), facecolor="none", edgecolor="black", linewidth=0.7)
+        )
         handles.append(Patch(facecolor="none", edgecolor="black", label=f"reference of a TP ({len(matched):,})"))
     if area is not None:
         axes.add_collection(
-            PathCollection(list(outlines([area])), facecolor="none", edgecolor="#555555", linestyle="--", linewidth=1)
+            PathCollection(
+                list(polygon_paths([area])), facecolor="none", edgecolor="#555555", linestyle="--", linewidth=1
+            )
         )
         handles.append(Patch(facecolor="none", edgecolor="#555555", linestyle="--", label="evaluation area"))
     add_scale_bar(axes)
     return handles
-
-
-def outlines(polygons: Iterable[Any]) -> Iterable[Outline]:
-    """Yield a matplotlib path for each polygon; holes stay open."""
-    for polygon in polygons:
-        rings = [np.asarray(ring.coords) for ring in shapely.get_rings(shapely.get_parts(polygon))]
-        if rings:
-            vertices = np.concatenate(rings)
-            codes = np.concatenate([_ring_codes(len(ring)) for ring in rings])
-            yield Outline(vertices, codes)
-
-
-def _ring_codes(count: int) -> NDArray[np.uint8]:
-    codes = np.full(count, Outline.LINETO, dtype=np.uint8)
-    codes[0], codes[-1] = Outline.MOVETO, Outline.CLOSEPOLY
-    return codes
 
 
 def _places(verdicts: Verdicts) -> tuple[list[tuple[float, float, float, float] | None], int]:
@@ -185,7 +171,7 @@ def _draw_group(axes: Axes, polygons: NDArray[np.object_], verdict: str, window:
     face = to_rgba(colour, 0.35 if hatch or verdict == "left out" else 0.75)
     visible = polygons[shapely.intersects(polygons, window)]
     axes.add_collection(
-        PathCollection(list(outlines(visible)), facecolor=face, edgecolor=colour, hatch=hatch, linewidth=0.6)
+        PathCollection(list(polygon_paths(visible)), facecolor=face, edgecolor=colour, hatch=hatch, linewidth=0.6)
     )
     return Patch(label=f"{label} ({len(polygons):,})", facecolor=face, edgecolor=colour, hatch=hatch, linewidth=0.6)
 

@@ -31,7 +31,7 @@ FLOORS = (("core",), ("scenes",), ("evaluators", "detectors"), ("benchmark",), (
 UNITS = {
     "scenes": (("geodata",), ("ground",), ("*",), ("importing", "synthetic")),
     "evaluators": (("overlay",), ("base",), ("threshold_free",), ("*",)),
-    "detectors": (("base",), ("shared",), ("*",), ("ndsm", "lines", "mpp", "dempster_shafer", "external")),
+    "detectors": (("steps",), ("base",), ("shared",), ("*",), ("ndsm", "lines", "mpp", "dempster_shafer", "external")),
     "benchmark": (("identity",), ("store",), ("suite",), ("plan",), ("execution",), ("analysis",), ("*",)),
     "reports": (("*",), ("steps",)),
 }

@@ -33,6 +33,7 @@ __all__ = [
     "UY",
     "V0",
     "V1",
+    "Boxes",
     "box_centres",
     "box_corners",
     "column_range",

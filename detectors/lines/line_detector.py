@@ -18,7 +18,8 @@ from ...core.parameters import parameter
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Image
 from ...scenes.scene import Scene
-from ..base import Detector, Step
+from ..base import Detector
+from ..steps import Step
 from .adjustment import by_length, rotate
 from .boxes import Boxes, box_corners, lengths, prefix_sums, widths
 from .colours import Colours
@@ -28,6 +29,7 @@ from .duplicates import find_duplicates
 from .extension import Cover, Growth, extend_lines, last_step
 from .final_rectangles import FinalRules, final_rectangles
 from .initial_rectangles import INSIDE, initial_rectangles
+from .line_steps import line_steps
 from .masks import build_masks, ground_heights, point_spacing, sunken
 from .rasters import Rasters
 from .segments import Segments, beyond_coverage, fit_segments, inside_first
@@ -309,10 +311,8 @@ class LineDetector(Detector):
         return Footprints.from_rectangles(rectangles, crs=scene.crs, metadata=found.counts(), source=self.name)
 
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
-        """Yield pictures of the masks, the lines, the rectangles and, where used, the votes and the histograms."""
-        from .drawing import draw_steps
-
-        yield from draw_steps(self.trace(scene))
+        """Return the masks, the lines, the rectangles and, where used, the votes and the histograms."""
+        return line_steps(self.trace(scene))
 
     def _rasters(self, scene: Scene) -> Rasters:
         points, image = scene.points, scene.image

@@ -10,27 +10,25 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import ParameterError
 from ...core.parameters import execution_option, parameter
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.scene import Scene
-from ..base import Detector, Step
+from ..base import Detector
+from ..steps import Step
 from .background import mean_evidence
 from .city import join_traces, sample_city, total_energy
 from .energy import own_energies
-from .figures import draw_convergence, draw_evidence, draw_heights, draw_outlines
 from .memory import give_back
+from .mpp_steps import mpp_steps
 from .outcome import as_blocks, as_buildings, fit_roofs
 from .preparation import Prepared, prepare
 from .printed import sample_printed
-from .rectangles import to_world
 from .tables import NO_TABLES
 from .workers import some_workers
 
@@ -182,29 +180,7 @@ class MPP(Detector):
         found, prepared = self._run(scene, rng)
         if prepared is None:
             return
-        boxes = prepared.boxes
-        yield Step("01-heights", "Heights above ground of high cells.", partial(draw_heights, prepared))
-        yield Step(
-            "02-evidence",
-            "What each cell adds to a rectangle: blue speaks for a roof, red against it.",
-            partial(draw_evidence, prepared),
-        )
-        yield Step(
-            "03-boxes",
-            f"{len(boxes)} boxes that the data suggest as births.",
-            partial(draw_outlines, prepared, shapely.polygons(to_world(boxes, prepared.grid)), colour="darkorange"),
-        )
-        trace = found.metadata["trace"]
-        yield Step(
-            "04-convergence",
-            "Energy, temperature, number of buildings and acceptance of each move over the chain.",
-            partial(draw_convergence, trace),
-        )
-        yield Step(
-            "05-buildings",
-            f"{len(found)} buildings after polishing.",
-            partial(draw_outlines, prepared, found.polygons),
-        )
+        yield from mpp_steps(prepared, found.polygons, found.metadata["trace"])
 
     def _evident(self, prepared: Prepared, rectangles: _Rectangles) -> NDArray[np.bool_]:
         """Return which rectangles look like a roof on the whole, not only in sum.

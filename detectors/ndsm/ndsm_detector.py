@@ -29,13 +29,16 @@ from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.ground.heights import heights_of
 from ...scenes.scene import Scene
-from ..base import Detector, Step
+from ..base import Detector
 from ..shared.cues import CellCues, cell_cues, greenness
 from ..shared.morphology import opened, without_holes
 from ..shared.outlines import coverage_of_mask, minimum_rectangles, trace
 from ..shared.regularise import regularise
+from ..steps import Step
+from .ndsm_steps import ndsm_steps
+from .ndsm_trace import NDSMTrace
 
-__all__ = ["NDSM", "Work"]
+__all__ = ["NDSM"]
 
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
@@ -123,15 +126,13 @@ class NDSM(Detector):
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Return the buildings of a scene; attributes `height` (mean above ground, m) and `tree_likeness` (-1..1)."""
-        return self.work(scene).footprints
+        return self.trace(scene).footprints
 
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
-        """Yield heights, cues, likeness to trees, mask and outlines."""
-        from .ndsm_drawing import draw_steps
+        """Return heights, cues, likeness to trees, mask and outlines."""
+        return ndsm_steps(self.trace(scene))
 
-        yield from draw_steps(self.work(scene))
-
-    def work(self, scene: Scene) -> Work:
+    def trace(self, scene: Scene) -> NDSMTrace:
         """Detect, and return every intermediate result."""
         scene.require(self.requires)
         scene = scene.for_detection()
@@ -143,15 +144,15 @@ class NDSM(Detector):
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
         high = np.nan_to_num(cues.high_share) >= 0.5
-        said = self._said(cues, self._vegetation(scene, grid))
-        likeness = _averaged(_mean_of(said, grid.shape), high, self.smoothing / grid.gsd)
+        cue_likeness = self._cue_likeness(cues, self._vegetation(scene, grid))
+        likeness = _averaged(_mean_of(cue_likeness, grid.shape), high, self.smoothing / grid.gsd)
         roof = high & ((likeness < 0) | np.isnan(likeness))
         mask = self._clean(roof, grid.gsd)
         traced = trace(coverage_of_mask(mask, np.where(likeness > 0, np.float32(0), cues.high_share)), grid)
-        return Work(
+        return NDSMTrace(
             cues=cues,
             high=high,
-            said=said,
+            cue_likeness=cue_likeness,
             likeness=likeness,
             roof=roof,
             mask=mask,
@@ -168,7 +169,7 @@ class NDSM(Detector):
         index = None if threshold is None else greenness(image, grid, darkest=self.darkest)
         return None if index is None or threshold is None else (index, threshold)
 
-    def _said(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> dict[str, _Floats]:
+    def _cue_likeness(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> dict[str, _Floats]:
         """Return what each cue says of each cell: -1 roof, 0 at its threshold, +1 tree, NaN nothing."""
         index, least_index = vegetation or (None, None)
         rules = {
@@ -202,36 +203,6 @@ class NDSM(Detector):
         return Footprints.of(polygons[keep], crs=crs, attributes=attributes, source=self.name)
 
 
-@dataclass(frozen=True, eq=False)
-class Work:
-    """All intermediate results of one detection; rasters of shape (rows, columns).
-
-    Attributes
-    ----------
-    cues : CellCues
-    high : ndarray of bool
-        Cells at least half of whose points are high.
-    said : dict of str to ndarray of float32
-        Per cue: -1 roof, +1 tree, NaN nothing.
-    likeness : ndarray of float32
-        Their mean over the neighbourhood.
-    roof, mask : ndarray of bool
-        High cells that look like a roof, before and after cleaning.
-    traced : ndarray of Polygon
-        Outlines of the mask, all vertices.
-    footprints : Footprints
-    """
-
-    cues: CellCues
-    high: _Mask
-    said: dict[str, _Floats]
-    likeness: _Floats
-    roof: _Mask
-    mask: _Mask
-    traced: NDArray[np.object_]
-    footprints: Footprints
-
-
 def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple[float, float, float, float]) -> float:
     """Return 1.4 times the point spacing in metres, in steps of 0.05 m, 0.25 to 2 m.
 
@@ -247,10 +218,10 @@ def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple
     return min(max(round(1.4 * spacing / 0.05) * 0.05, 0.25), 2.0)
 
 
-def _mean_of(said: dict[str, _Floats], shape: tuple[int, int]) -> _Floats:
+def _mean_of(cue_likeness: dict[str, _Floats], shape: tuple[int, int]) -> _Floats:
     """Return the weighted mean of what the cues say; NaN where none says anything."""
     total, weights = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
-    for name, cue in said.items():
+    for name, cue in cue_likeness.items():
         weight = np.float32(_IMAGE_WEIGHT if name == _IMAGE else 1)
         told = np.isfinite(cue)
         total += np.where(told, weight * cue, 0)

@@ -319,16 +319,14 @@ def crop(scene, share):
 
 
 def pictures(_seeds):
-    from matplotlib.figure import Figure
+    from roofbench.reports.steps.step_figure import step_figure
 
     for detector, name, share in (("original", "fairfield-1", 0.4), ("improved", "moonee-ponds", 0.22)):
         scene = crop(scene_of(name, 1), share)
-        for step in rb.make_detector(detector).steps(scene, np.random.default_rng(0)):
-            if f"{detector}-{step.name}" not in PICTURED:
-                continue
-            figure = Figure()
-            step.draw(figure)
-            save(figure, f"lines-{detector}-{step.name}.png")
+        for number, step in enumerate(rb.make_detector(detector).steps(scene, np.random.default_rng(0)), start=1):
+            name = f"{detector}-{number:02d}-{step.name}"
+            if name in PICTURED:
+                save(step_figure(step), f"lines-{name}.png")
 
 
 STUDIES = {

@@ -297,15 +297,12 @@ def shapes(folders):
 
 def pictures(folders):
     """Draw what the cells say, the convergence and the result of one run."""
-    from matplotlib.figure import Figure
+    from roofbench.reports.steps.step_figure import step_figure
 
     scene = rb.open_scene(folders[0])
     for step in rb.make_detector("mpp").steps(scene, np.random.default_rng(0)):
-        name = step.name.split("-", 1)[1]
-        if name in ("evidence", "convergence", "buildings"):
-            figure = Figure(figsize=(7, 6.4), layout="constrained")
-            step.draw(figure)
-            save(figure, f"mpp-{name}.png")
+        if step.name in ("evidence", "convergence", "buildings"):
+            save(step_figure(step), f"mpp-{step.name}.png")
 
 
 def save(figure, name):

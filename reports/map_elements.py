@@ -1,16 +1,21 @@
-"""The scale bar of a map: what every picture of a place carries, those of the steps of a detector too."""
+"""Elements that all maps share: the scale bar and the paths of polygons."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import shapely
 from matplotlib.patches import Rectangle
+from matplotlib.path import Path
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["add_scale_bar"]
+__all__ = ["add_scale_bar", "polygon_paths"]
 
 
 def add_scale_bar(axes: Axes, *, unit: float = 1.0) -> None:
@@ -29,10 +34,24 @@ def add_scale_bar(axes: Axes, *, unit: float = 1.0) -> None:
     step = 10 ** math.floor(math.log10(target))
     length = max(factor * step for factor in (1, 2, 5) if factor * step <= target)
     x, y = left + 0.03 * width, bottom + 0.03 * height
-    # The white edge shows it on black ground.
+    # The white edge separates the bar from dark ground.
     bar = Rectangle((x, y), length / unit, 0.01 * height, facecolor="black", edgecolor="white", linewidth=0.8, zorder=6)
     axes.add_patch(bar)
     label = f"{length / 1000:g} km" if length >= 1000 else f"{length:g} m"
     background = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.5}
     middle = x + length / unit / 2
     axes.text(middle, y + 0.02 * height, label, ha="center", va="bottom", fontsize=9, zorder=6, bbox=background)
+
+
+def polygon_paths(polygons: Iterable[Any]) -> Iterator[Path]:
+    """Yield a matplotlib path for each polygon or multipolygon that is not empty; holes stay open."""
+    for polygon in polygons:
+        rings = [np.asarray(ring.coords) for ring in shapely.get_rings(shapely.get_parts(polygon))]
+        if rings:
+            yield Path(np.concatenate(rings), np.concatenate([_ring_codes(len(ring)) for ring in rings]))
+
+
+def _ring_codes(count: int) -> NDArray[np.uint8]:
+    codes = np.full(count, Path.LINETO, dtype=np.uint8)
+    codes[0], codes[-1] = Path.MOVETO, Path.CLOSEPOLY
+    return codes
