@@ -11,15 +11,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import OX, OY, UX, UY, Boxes, lengths
 
 __all__ = ["adjust_to_neighbours", "adjust_to_shape", "by_length", "rotate", "rotation_between"]
 
 
-@njit(cache=True)
+@kernel
 def rotation_between(direction: float, reference: float) -> float:
     """Return the angle that turns `direction` parallel or perpendicular to `reference`, radians in (-pi/4, pi/4]."""
     quarter = math.pi / 2
@@ -27,7 +27,7 @@ def rotation_between(direction: float, reference: float) -> float:
     return turn - quarter if turn > math.pi / 4 else turn
 
 
-@njit(cache=True)
+@kernel
 def _nearest_rotations(
     lines: NDArray[np.float64],
     order: NDArray[np.int64],

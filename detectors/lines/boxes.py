@@ -21,8 +21,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ...core.kernels import kernel
 
 __all__ = [
     "OX",
@@ -86,7 +87,7 @@ def box_centres(boxes: Boxes) -> NDArray[np.float64]:
     return _at(boxes, (boxes[:, U0] + boxes[:, U1]) / 2, (boxes[:, V0] + boxes[:, V1]) / 2)
 
 
-@njit(cache=True)
+@kernel
 def prefix_sums(raster: NDArray[np.uint8]) -> NDArray[np.int32]:
     """Return the row prefix sums of a uint8 raster."""
     rows, columns = raster.shape
@@ -100,7 +101,7 @@ def prefix_sums(raster: NDArray[np.uint8]) -> NDArray[np.int32]:
     return prefix
 
 
-@njit(cache=True)
+@kernel
 def row_range(box: NDArray[np.float64]) -> tuple[int, int]:
     """Return the half-open range of rows whose centre line can cross the box."""
     along0, along1 = box[U0] * box[UY], box[U1] * box[UY]
@@ -110,7 +111,7 @@ def row_range(box: NDArray[np.float64]) -> tuple[int, int]:
     return math.ceil(low - 0.5), math.ceil(high - 0.5)
 
 
-@njit(cache=True)
+@kernel
 def _slab(slope: float, low: float, high: float, x0: float, x1: float) -> tuple[float, float]:
     """Cut the interval [x0, x1) to where ``low <= slope * x < high``."""
     if abs(slope) < 1e-12:
@@ -119,7 +120,7 @@ def _slab(slope: float, low: float, high: float, x0: float, x1: float) -> tuple[
     return max(x0, min(at_low, at_high)), min(x1, max(at_low, at_high))
 
 
-@njit(cache=True)
+@kernel
 def column_range(box: NDArray[np.float64], row: int) -> tuple[int, int]:
     """Return the half-open range of columns of one row whose cell centres lie in the box; not clipped to a raster."""
     dy = row + 0.5 - box[OY]
@@ -129,7 +130,7 @@ def column_range(box: NDArray[np.float64], row: int) -> tuple[int, int]:
     return first, max(first, math.ceil(box[OX] + x1 - 0.5))
 
 
-@njit(cache=True)
+@kernel
 def sum_in_box(prefix: NDArray[np.int32], box: NDArray[np.float64]) -> tuple[int, int, int]:
     """Return the sum over the cells whose centre is in the box, the number of them on the raster, and in all."""
     rows, columns = prefix.shape[0], prefix.shape[1] - 1
@@ -146,14 +147,14 @@ def sum_in_box(prefix: NDArray[np.int32], box: NDArray[np.float64]) -> tuple[int
     return total, on_raster, in_all
 
 
-@njit(cache=True)
+@kernel
 def to_box(x: float, y: float, box: NDArray[np.float64]) -> tuple[float, float]:
     """Return the coordinates (u, v) of a point (x, y) along and across a box."""
     dx, dy = x - box[OX], y - box[OY]
     return dx * box[UX] + dy * box[UY], -dx * box[UY] + dy * box[UX]
 
 
-@njit(cache=True)
+@kernel
 def length_inside(line: NDArray[np.float64], box: NDArray[np.float64]) -> float:
     """Return the length of the part of a line that lies in a box, pixels."""
     u, v = to_box(line[OX], line[OY], box)

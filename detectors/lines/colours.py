@@ -20,9 +20,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import column_range, row_range
 
 __all__ = ["BINS", "Colours", "dominant_bins", "dominant_ranges", "yiq_bins"]
@@ -47,7 +47,7 @@ class Colours(NamedTuple):
     full: float
 
 
-@njit(cache=True)
+@kernel
 def yiq_bins(colours: Colours, row: int, column: int) -> tuple[int, int, int]:
     """Return the histogram bins of Y, I and Q of one cell."""
     r = colours.values[0, row, column] / colours.full
@@ -63,7 +63,7 @@ def yiq_bins(colours: Colours, row: int, column: int) -> tuple[int, int, int]:
     )
 
 
-@njit(cache=True)
+@kernel
 def split_parts(histogram: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the first bin of each part and, at the end, the number of bins; parts are cut after minima."""
     bins = len(histogram)
@@ -81,7 +81,7 @@ def split_parts(histogram: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.array(cuts, dtype=np.int64)
 
 
-@njit(cache=True)
+@kernel
 def dominant_bins(histogram: NDArray[np.int64], part_share: float, total_share: float) -> NDArray[np.bool_]:
     """Return which bins of a histogram belong to its dominant ranges."""
     cuts = split_parts(histogram)
@@ -111,7 +111,7 @@ def dominant_bins(histogram: NDArray[np.int64], part_share: float, total_share: 
     return within
 
 
-@njit(cache=True)
+@kernel
 def dominant_ranges(
     colours: Colours, box: NDArray[np.float64], part_share: float, total_share: float
 ) -> NDArray[np.bool_]:

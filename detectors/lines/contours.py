@@ -22,8 +22,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ...core.kernels import kernel
 
 __all__ = ["SAMPLE", "Curves", "sample_curves", "smooth", "trace_shapes"]
 
@@ -57,7 +58,7 @@ class Curves:
         return len(self.shapes)
 
 
-@njit(cache=True)
+@kernel
 def _resample(
     points: NDArray[np.float64], offsets: NDArray[np.int64], spacing: float, closed: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -132,7 +133,7 @@ def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float, sampl
     return sample_curves(points, offsets, np.array(shapes, dtype=np.int64), closed=True, spacing=sample / gsd)
 
 
-@njit(cache=True)
+@kernel
 def _convolve(
     points: NDArray[np.float64], offsets: NDArray[np.int64], kernel: NDArray[np.float64], closed: bool
 ) -> NDArray[np.float64]:

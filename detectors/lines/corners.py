@@ -20,9 +20,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .contours import Curves, smooth
 
 __all__ = ["CHORDS", "find_corners"]
@@ -33,7 +33,7 @@ CHORDS = (10, 20, 30)
 _WIDER = 1.0
 
 
-@njit(cache=True)
+@kernel
 def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -> NDArray[np.float64]:
     """Return h_L(k) for every point of one curve, shape (n,); chords that leave an open curve are left out."""
     n = len(curve)
@@ -50,7 +50,7 @@ def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -
     return np.abs(out)
 
 
-@njit(cache=True)
+@kernel
 def _turn(curve: NDArray[np.float64], before: int, at: int, after: int) -> float:
     """Return the angle by which the path before -> at -> after turns, degrees, 0 = straight on."""
     ax, ay = curve[at, 0] - curve[before, 0], curve[at, 1] - curve[before, 1]
@@ -58,7 +58,7 @@ def _turn(curve: NDArray[np.float64], before: int, at: int, after: int) -> float
     return abs(math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by)))
 
 
-@njit(cache=True)
+@kernel
 def _neighbours(corners: list[int], i: int, n: int, arm: int, closed: bool) -> tuple[int, int]:
     """Return the points that the angle of corner i is measured to: the corners beside it, or `arm` points away."""
     at = corners[i]
@@ -72,7 +72,7 @@ def _neighbours(corners: list[int], i: int, n: int, arm: int, closed: bool) -> t
     return before, after
 
 
-@njit(cache=True)
+@kernel
 def corners_of_curve(
     curve: NDArray[np.float64],
     wider: NDArray[np.float64],
@@ -116,7 +116,7 @@ def corners_of_curve(
     return np.array(corners, dtype=np.int64)
 
 
-@njit(cache=True)
+@kernel
 def _corners_of_all(
     points: NDArray[np.float64],
     wider: NDArray[np.float64],

@@ -13,9 +13,9 @@ line made lies across the sides of the one before it and so is never completely 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .adjustment import rotation_between
 from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, Boxes, box_centres, lengths, to_box, widths
 
@@ -25,7 +25,7 @@ __all__ = ["find_duplicates"]
 _LATTICE = 32
 
 
-@njit(cache=True)
+@kernel
 def new_share(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
     """Return the share of a box's area that lies in none of the others, from a lattice in its own coordinates."""
     new = 0
@@ -44,7 +44,7 @@ def new_share(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
     return new / _LATTICE**2
 
 
-@njit(cache=True)
+@kernel
 def _find(
     boxes: NDArray[np.float64],
     order: NDArray[np.int64],

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.raster import Image
 
 __all__ = ["WINDOW", "grey_levels", "local_entropy"]
@@ -21,7 +21,7 @@ __all__ = ["WINDOW", "grey_levels", "local_entropy"]
 WINDOW = 9
 
 
-@njit(cache=True)
+@kernel
 def _grey(red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], unit: int) -> NDArray[np.uint8]:
     rows, columns = red.shape
     grey = np.empty((rows, columns), dtype=np.uint8)
@@ -39,7 +39,7 @@ def grey_levels(image: Image) -> NDArray[np.uint8]:
     return grey
 
 
-@njit(cache=True)
+@kernel
 def local_entropy(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return the normalised local entropy, 0..255, shape (rows, columns).
 

@@ -15,9 +15,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import U0, U1, V0, V1, Boxes, sum_in_box
 
 __all__ = ["Cover", "Growth", "band", "extend_lines", "extend_rectangle", "last_step", "mean_in_boxes"]
@@ -72,14 +72,14 @@ def last_step(rules: Growth) -> float:
     return step
 
 
-@njit(cache=True)
+@kernel
 def mean_in_box(prefix: NDArray[np.int32], box: NDArray[np.float64]) -> float:
     """Return the mean over the cells in a box, 0 where there is none."""
     total, cells, _ = sum_in_box(prefix, box)
     return total / cells if cells > 0 else 0.0
 
 
-@njit(cache=True)
+@kernel
 def mean_in_boxes(prefix: NDArray[np.int32], boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean over the cells in each box, shape (n,)."""
     out = np.empty(len(boxes))
@@ -88,7 +88,7 @@ def mean_in_boxes(prefix: NDArray[np.int32], boxes: NDArray[np.float64]) -> NDAr
     return out
 
 
-@njit(cache=True)
+@kernel
 def is_vegetation(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> bool:
     """Tell whether the cells in a box look like vegetation."""
     if mean_in_box(cover.vegetation, box) <= rules.vegetation:
@@ -96,14 +96,14 @@ def is_vegetation(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> bool
     return len(cover.entropy) == 0 or mean_in_box(cover.entropy, box) > rules.entropy
 
 
-@njit(cache=True)
+@kernel
 def passes(cover: Cover, rules: Growth, strip: NDArray[np.float64]) -> bool:
     """Tell whether a part of a strip may be added."""
     black, _, cells = sum_in_box(cover.black, strip)
     return cells > 0 and black > rules.black_share * cells and not is_vegetation(cover, rules, strip)
 
 
-@njit(cache=True)
+@kernel
 def parts_pass(cover: Cover, rules: Growth, strip: NDArray[np.float64], start: int) -> bool:
     """Tell whether each part of a strip passes; `start` is where its interval along the side begins, `U0` or `V0`."""
     first, last = strip[start], strip[start + 1]
@@ -117,7 +117,7 @@ def parts_pass(cover: Cover, rules: Growth, strip: NDArray[np.float64], start: i
     return True
 
 
-@njit(cache=True)
+@kernel
 def extend_side(cover: Cover, rules: Growth, box: NDArray[np.float64], side: int) -> None:
     """Move one end (`U0`, `U1`, `V0` or `V1`) of a box outwards, in place, as far as the strips pass."""
     outwards = 1.0 if side in (U1, V1) else -1.0
@@ -133,7 +133,7 @@ def extend_side(cover: Cover, rules: Growth, box: NDArray[np.float64], side: int
             step /= 2
 
 
-@njit(cache=True)
+@kernel
 def extend_lines(cover: Cover, rules: Growth, lines: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
     """Return the lines with both ends extended; strips are `depth` pixels deep on the black side."""
     out = lines.copy()
@@ -146,7 +146,7 @@ def extend_lines(cover: Cover, rules: Growth, lines: NDArray[np.float64], depth:
     return out
 
 
-@njit(cache=True)
+@kernel
 def extend_rectangle(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> None:
     """Extend the side opposite to the line, then both lateral ones, in place."""
     extend_side(cover, rules, box, V1)

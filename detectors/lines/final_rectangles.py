@@ -20,9 +20,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, to_box
 from .colours import Colours, dominant_ranges, yiq_bins
 
@@ -65,7 +65,7 @@ class FinalRules(NamedTuple):
     whole_initial: bool
 
 
-@njit(cache=True)
+@kernel
 def shrink(box: NDArray[np.float64], share: float) -> NDArray[np.float64]:
     """Return a box with length and width less by `share`, about the same centre."""
     out = box.copy()
@@ -77,7 +77,7 @@ def shrink(box: NDArray[np.float64], share: float) -> NDArray[np.float64]:
     return out
 
 
-@njit(cache=True)
+@kernel
 def lies_inside(inner: NDArray[np.float64], outer: NDArray[np.float64]) -> bool:
     """Tell whether all corners of one box are in the other."""
     slack = 1e-9
@@ -91,7 +91,7 @@ def lies_inside(inner: NDArray[np.float64], outer: NDArray[np.float64]) -> bool:
     return True
 
 
-@njit(cache=True)
+@kernel
 def strip_shares(
     colours: Colours,
     primary: NDArray[np.uint8],
@@ -122,7 +122,7 @@ def strip_shares(
     return in_range.min() / samples, black / samples, filled / samples
 
 
-@njit(cache=True)
+@kernel
 def extend_final_side(
     colours: Colours,
     primary: NDArray[np.uint8],
@@ -150,7 +150,7 @@ def extend_final_side(
             width /= 2
 
 
-@njit(cache=True)
+@kernel
 def final_rectangles(
     colours: Colours,
     primary: NDArray[np.uint8],

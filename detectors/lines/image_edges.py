@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import Boxes
 from .contours import SAMPLE, Curves, sample_curves
 from .corners import find_corners
@@ -71,7 +71,7 @@ def edge_pixels(grey: NDArray[np.uint8], blur: float, contrast: float) -> NDArra
     return np.asarray(edges > 0).view(np.uint8)
 
 
-@njit(cache=True)
+@kernel
 def _next_pixel(edges: NDArray[np.uint8], row: int, column: int, from_row: int, from_column: int) -> int:
     """Return which neighbour continues a chain straightest from (from_row, from_column), -1 without any unused one."""
     rows, columns = edges.shape
@@ -87,7 +87,7 @@ def _next_pixel(edges: NDArray[np.uint8], row: int, column: int, from_row: int, 
     return best
 
 
-@njit(cache=True)
+@kernel
 def _unused_neighbours(edges: NDArray[np.uint8], row: int, column: int) -> int:
     rows, columns = edges.shape
     count = 0
@@ -98,7 +98,7 @@ def _unused_neighbours(edges: NDArray[np.uint8], row: int, column: int) -> int:
     return count
 
 
-@njit(cache=True)
+@kernel
 def link_pixels(edges: NDArray[np.uint8], least: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Link edge pixels to chains of at least `least` pixels: points (n, 2) at pixel centres, and offsets.
 

@@ -8,9 +8,9 @@ Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.3.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, length_inside, to_box
 from .extension import Cover, Growth, extend_rectangle
 
@@ -21,7 +21,7 @@ INSIDE = -1
 TOO_NARROW = -2
 
 
-@njit(cache=True)
+@kernel
 def share_inside(line: NDArray[np.float64], box: NDArray[np.float64], margin: float) -> float:
     """Return the share of a line's length that lies in a box widened by `margin`; 0 when its midpoint does not."""
     wide = box.copy()
@@ -36,7 +36,7 @@ def share_inside(line: NDArray[np.float64], box: NDArray[np.float64], margin: fl
     return float(length_inside(line, wide) / (line[U1] - line[U0]))
 
 
-@njit(cache=True)
+@kernel
 def initial_rectangles(
     cover: Cover,
     rules: Growth,

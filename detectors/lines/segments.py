@@ -13,9 +13,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, Boxes, lengths
 from .contours import Curves
 
@@ -45,7 +45,7 @@ class Segments:
         return Segments(self.lines[index], self.shapes[index])
 
 
-@njit(cache=True)
+@kernel
 def fit_line(
     points: NDArray[np.float64], ends: NDArray[np.float64], first: int, count: int, start: int, n: int
 ) -> NDArray[np.float64]:
@@ -82,7 +82,7 @@ def fit_line(
     return line
 
 
-@njit(cache=True)
+@kernel
 def _deviation(
     points: NDArray[np.float64], first: int, count: int, start: int, n: int, line: NDArray[np.float64]
 ) -> tuple[float, int]:
@@ -100,7 +100,7 @@ def _deviation(
     return math.sqrt(total / count), farthest
 
 
-@njit(cache=True)
+@kernel
 def _fit_pieces(
     points: NDArray[np.float64],
     ends: NDArray[np.float64],
@@ -127,7 +127,7 @@ def _fit_pieces(
             lines.append(line)
 
 
-@njit(cache=True)
+@kernel
 def _fit_all(
     points: NDArray[np.float64],
     raw: NDArray[np.float64],

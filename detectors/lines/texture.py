@@ -23,9 +23,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import U0, U1, V0, V1, Boxes, box_corners, lengths, to_box, widths
 from .contours import SAMPLE, Curves
 from .image_edges import ImageEdges
@@ -59,7 +59,7 @@ class Texture:
     passed: NDArray[np.bool_]
 
 
-@njit(cache=True)
+@kernel
 def _orientation_bins(points: NDArray[np.float64], offsets: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the histogram bin of the tangent at each curve point, by differences of its neighbours."""
     out = np.zeros(len(points), dtype=np.int64)
@@ -73,7 +73,7 @@ def _orientation_bins(points: NDArray[np.float64], offsets: NDArray[np.int64]) -
     return out
 
 
-@njit(cache=True)
+@kernel
 def _sort_into_cells(
     points: NDArray[np.float64], rows: int, columns: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -93,7 +93,7 @@ def _sort_into_cells(
     return order, start
 
 
-@njit(cache=True)
+@kernel
 def _histograms(
     boxes: NDArray[np.float64],
     bounds: NDArray[np.float64],

@@ -13,9 +13,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.raster import Image
 
 __all__ = ["vegetation_prefix"]
@@ -24,7 +24,7 @@ __all__ = ["vegetation_prefix"]
 _WITHOUT_NIR = {"green-red": ("green", "red", 2), "pseudo-ndvi": ("red", "green", 1)}
 
 
-@njit(cache=True)
+@kernel
 def _index_prefix(plus: NDArray[Any], minus: NDArray[Any], factor: int) -> NDArray[np.int32]:
     rows, columns = plus.shape
     prefix = np.empty((rows, columns + 1), dtype=np.int32)

@@ -12,15 +12,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, Boxes, length_inside, lengths
 
 __all__ = ["cast_votes", "longest_image_lines"]
 
 
-@njit(cache=True)
+@kernel
 def _longest(
     lines: NDArray[np.float64], image_lines: NDArray[np.float64], half_width: float, reach: float
 ) -> NDArray[np.float64]:

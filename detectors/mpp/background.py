@@ -30,9 +30,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .cells import HIGH, LOW, Cells
 from .rectangles import row_span
 from .tables import MILLI
@@ -99,7 +99,7 @@ def textures(
 _NONE = np.int16(_ROUGH_BINS * _OPEN_BINS)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _describe_windows(height, state, openness, first, last, windows):  # type: ignore[no-untyped-def]
     """Fill the bin of the window around each cell of some rows."""
     rows, columns = state.shape
@@ -130,7 +130,7 @@ def _describe_windows(height, state, openness, first, last, windows):  # type: i
             windows[r, c] = a * _OPEN_BINS + b
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _choose_windows(windows, state, first, last, bins):  # type: ignore[no-untyped-def]
     """Give each cell of some rows the bin of the smoothest window that holds it."""
     rows, columns = windows.shape
@@ -147,7 +147,7 @@ def _choose_windows(windows, state, first, last, bins):  # type: ignore[no-untyp
                 bins[r, c] = least
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _tally(bins, height, first, last):  # type: ignore[no-untyped-def]
     """Return n, sum of heights, of their squares (centimetres) of each bin in some rows, shape (192, 3), int64."""
     tally = np.zeros((_ROUGH_BINS * _OPEN_BINS, 3), dtype=np.int64)
@@ -255,7 +255,7 @@ def _evidence(background: Background, weight: float, limit: float) -> NDArray[np
     return np.clip(weight * np.array(background.evidence), -limit, limit).ravel()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _choose_fitted(state, bins, evidence, thin, first, last, fitted):  # type: ignore[no-untyped-def]
     for r in range(first, last):
         for c in range(state.shape[1]):
@@ -305,7 +305,7 @@ def score_cells(
     return modest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def restrain(score, state, reach, first, last, modest):  # type: ignore[no-untyped-def]
     """Fill the scores of some rows, of high cells at most the mean of the high cells within some rows and columns."""
     rows, columns = score.shape
@@ -323,13 +323,13 @@ def restrain(score, state, reach, first, last, modest):  # type: ignore[no-untyp
             modest[r, c] = min(np.int64(score[r, c]), total // many)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _milli(nats):  # type: ignore[no-untyped-def]
     """Return thousandths of a nat, within what 16 bits hold."""
     return np.int16(min(max(round(nats * MILLI), -32767), 32767))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _score(height, state, bins, evidence, crowns, fit_weight, prices, first, last, score):  # type: ignore[no-untyped-def]
     mean, spread = crowns
     thin, low_price, void_price = prices
@@ -366,7 +366,7 @@ def mean_evidence(
     return means
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _mean_evidence(rectangles, height, state, score, crowns, fit_weight):  # type: ignore[no-untyped-def]
     mean, spread = crowns
     level = -math.log(spread * math.sqrt(2.0 * math.pi))

@@ -12,9 +12,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .random_stream import uniform
 
 __all__ = ["Births", "birth_density", "make_births", "propose_birth"]
@@ -102,7 +102,7 @@ def make_births(
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def propose_birth(births, state, rectangle):  # type: ignore[no-untyped-def]
     """Draw a rectangle from q; its centre or sides may fall outside what is allowed, where the target is 0."""
     least, largest = births.sides[0], births.sides[1]
@@ -123,7 +123,7 @@ def propose_birth(births, state, rectangle):  # type: ignore[no-untyped-def]
     rectangle[4] = (box[4] + KERNEL_TURN * (2.0 * uniform(state) - 1.0)) % math.pi
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def birth_density(births, rectangle):  # type: ignore[no-untyped-def]
     """Return q of a rectangle, per cells^4 and radian."""
     w = births.window

@@ -18,9 +18,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .patches import cells_of_patches, label_patches
 from .workers import ALONE, Workers
 
@@ -82,7 +82,7 @@ def _boxes_of_patches(
     return workers.map(work, workers.ranges(np.diff(starts)))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _boxes(members, starts, first, last, finer, least_cells, shape):  # type: ignore[no-untyped-def]
     """Return the boxes of some patches but those that are also patches of `finer` labels, which had them already."""
     boxes = np.empty(((_PIECES + 1) * (last - first), 5))
@@ -96,7 +96,7 @@ def _boxes(members, starts, first, last, finer, least_cells, shape):  # type: ig
     return boxes[:n].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _is_patch(labels, cells):  # type: ignore[no-untyped-def]
     """Whether all cells have one label; a finer step only parts patches, so that this label has no other cells."""
     if len(labels) == 1:
@@ -108,7 +108,7 @@ def _is_patch(labels, cells):  # type: ignore[no-untyped-def]
     return others == 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _row_ends(cells):  # type: ignore[no-untyped-def]
     """Return the first and last cell of each row: no other lies farthest out in any direction."""
     ends = np.empty_like(cells)
@@ -120,7 +120,7 @@ def _row_ends(cells):  # type: ignore[no-untyped-def]
     return ends[:n]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _bounding_area(cells, angle):  # type: ignore[no-untyped-def]
     """Area of the bounding rectangle at an angle."""
     cos, sin = math.cos(angle), math.sin(angle)
@@ -133,7 +133,7 @@ def _bounding_area(cells, angle):  # type: ignore[no-untyped-def]
     return (high_u - low_u + 1.0) * (high_v - low_v + 1.0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _best_angle(cells):  # type: ignore[no-untyped-def]
     """Angle in a quarter turn at which the bounding rectangle is smallest, to an eighth of the first step."""
     best, best_angle = np.inf, 0.0
@@ -153,7 +153,7 @@ def _best_angle(cells):  # type: ignore[no-untyped-def]
     return best_angle % (0.5 * math.pi)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _rim_inside(cells, shape):  # type: ignore[no-untyped-def]
     """Return the first and last cells of the rows and columns of a patch but those at the border of the scene.
 
@@ -186,7 +186,7 @@ def _rim_inside(cells, shape):  # type: ignore[no-untyped-def]
     return ends[:n]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _wall_angle(rim):  # type: ignore[no-untyped-def]
     """Angle in a quarter turn at which most cells of a rim lie on common lines along the axes."""
     reach = 0
@@ -208,7 +208,7 @@ def _wall_angle(rim):  # type: ignore[no-untyped-def]
     return best_angle
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _take_apart(cells, angle, least_cells, boxes, n):  # type: ignore[no-untyped-def]
     """Append the bounding and the largest filled rectangles of a patch at an angle, until what is left is small."""
     cos, sin = math.cos(angle), math.sin(angle)
@@ -246,7 +246,7 @@ def _take_apart(cells, angle, least_cells, boxes, n):  # type: ignore[no-untyped
     return n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _largest_filled(full):  # type: ignore[no-untyped-def]
     """Area, top, left, bottom, right of the largest rectangle of true cells (histogram of runs, one stack per row)."""
     rows, columns = full.shape

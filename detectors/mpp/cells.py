@@ -25,9 +25,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
 from ...scenes.ground.lowest_points import coverage
@@ -139,7 +139,7 @@ def make_cells(
     return Cells(grid, height, other, openness)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _cell_of(x, y, frame, first, last, columns):  # type: ignore[no-untyped-def]
     """Return the flat cell of a place, -1 outside rows first..last and outside the columns."""
     west, north, cell = frame
@@ -152,7 +152,7 @@ def _cell_of(x, y, frame, first, last, columns):  # type: ignore[no-untyped-def]
     return int(row) * columns + int(column)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _above(x, y, z, ground, place):  # type: ignore[no-untyped-def]
     """Return the height above ground in centimetres, `_ASTRAY` where there is none or it is in the sky."""
     west, north, cell = place
@@ -168,7 +168,7 @@ def _above(x, y, z, ground, place):  # type: ignore[no-untyped-def]
     return math.floor(h * 100.0 + 0.5) if -_SKY < h < _SKY else _ASTRAY
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count(x, y, z, returns, ground, place, frame, first, last, columns, low, counts):  # type: ignore[no-untyped-def]
     """Count all points, high ones and parts of multiple returns per cell, and find the top: columns 0 to 3."""
     for i in range(len(x)):
@@ -186,7 +186,7 @@ def _count(x, y, z, returns, ground, place, frame, first, last, columns, low, co
             counts[k, 2] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _add_tops(x, y, z, ground, place, frame, first, last, columns, counts, tops):  # type: ignore[no-untyped-def]
     """Count and sum up the points near the top of their cell.
 
@@ -202,7 +202,7 @@ def _add_tops(x, y, z, ground, place, frame, first, last, columns, counts, tops)
             tops[k, 1] += height
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _summarise(counts, tops, first, last, height, state, openness):  # type: ignore[no-untyped-def]
     """Fill height, state and openness of some rows from what was counted."""
     columns = state.shape[1]
@@ -221,7 +221,7 @@ def _summarise(counts, tops, first, last, height, state, openness):  # type: ign
                 openness[r, c] = (255 * max(n - high, many)) // n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _despike(height, before, first, last, state):  # type: ignore[no-untyped-def]
     """Fill the states of some rows, in which high cells are void whose height no neighbour shares to 2 m.
 
@@ -245,7 +245,7 @@ def _despike(height, before, first, last, state):  # type: ignore[no-untyped-def
                 state[r, c] = VOID
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill(height, openness, before, first, last, state):  # type: ignore[no-untyped-def]
     """Fill the states of some rows, in which void cells have that of most neighbours where three at least are known.
 

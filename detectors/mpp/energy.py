@@ -13,8 +13,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ...core.kernels import kernel
 from .rectangles import overlap_area
 from .roofs import choose_roof, log_likelihood, scan
 
@@ -65,19 +65,19 @@ class Model(NamedTuple):
     ground_error: float
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def ground_variance(rectangle, model):  # type: ignore[no-untyped-def]
     """Return the variance of heights, m2, that the unknown ground under a rectangle explains."""
     return (max(rectangle[2], rectangle[3]) * model.cell * model.ground_error) ** 2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def own_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def]
     """Return the energy of a rectangle by itself."""
     return energy_below(small, large, rectangle, model, np.inf)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def own_energies(small, large, rectangles, model):  # type: ignore[no-untyped-def]
     """Return the energy of each rectangle by itself, shape (n,)."""
     energies = np.empty(len(rectangles))
@@ -86,7 +86,7 @@ def own_energies(small, large, rectangles, model):  # type: ignore[no-untyped-de
     return energies
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def energy_below(small, large, rectangle, model, limit):  # type: ignore[no-untyped-def]
     """Return the energy of a rectangle by itself if it is less than a limit, else some number that is not.
 
@@ -118,7 +118,7 @@ def energy_below(small, large, rectangle, model, limit):  # type: ignore[no-unty
     return base - share * likelihood
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def least_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def]
     """Return a bound that the energy of a rectangle by itself is not less than, from its scan alone."""
     if model.weight == 0.0:
@@ -128,7 +128,7 @@ def least_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def
     return model.price - model.weight * (moments[0] - model.void_price * moments[1] + model.fit_weight * most)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def overlaps(rectangles, count, rectangle, skip, other):  # type: ignore[no-untyped-def]
     """Return the area, cells squared, that a rectangle shares with the first `count`, two of them passed over."""
     area = 0.0
@@ -141,7 +141,7 @@ def overlaps(rectangles, count, rectangle, skip, other):  # type: ignore[no-unty
     return area
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def configuration_energy(small, large, rectangles, count, fixed, model):  # type: ignore[no-untyped-def]
     """Return U of the first `count` rectangles, their overlap with fixed ones included, from scratch."""
     total = 0.0

@@ -25,9 +25,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .cells import HIGH, LOW, VOID
 from .patches import patch_sizes
 from .rectangles import overlap_area, row_span
@@ -92,7 +92,7 @@ def lower_storeys(
         workers.map(work, workers.ranges(batch[:, 2] * batch[:, 3], each=2))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _waves(boxes, rows, columns):  # type: ignore[no-untyped-def]
     """Return the wave of each box: the first after those of all boxes before it that it may share a cell with."""
     wave = np.zeros(len(boxes), dtype=np.int64)
@@ -125,13 +125,13 @@ def _waves(boxes, rows, columns):  # type: ignore[no-untyped-def]
     return wave
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _square(place, size):  # type: ignore[no-untyped-def]
     """Return the square of the grid along one axis that a place lies in, the nearest one outside."""
     return int(min(max(place, 0.0), size - 1.0)) // _SQUARE
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lower_boxes(height, state, roofs, labels, sizes, boxes, step):  # type: ignore[no-untyped-def]
     for k in range(len(boxes)):
         box = boxes[k].copy()
@@ -139,7 +139,7 @@ def _lower_boxes(height, state, roofs, labels, sizes, boxes, step):  # type: ign
         _lower_one(height, state, roofs, labels, sizes, box, step)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _grow(height, state, box, step):  # type: ignore[no-untyped-def]
     """Move the sides of a box out over strips of half a cell that are mostly high, in place, but not up a step.
 
@@ -172,7 +172,7 @@ def _grow(height, state, box, step):  # type: ignore[no-untyped-def]
             box[1] += 0.25 * end * (sin if axis == 0 else cos)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _cells_of(box, shape, inner):  # type: ignore[no-untyped-def]
     """Return row, column and side of the border (4: within it, 5: at its very edge) of the cells of a box.
 
@@ -210,7 +210,7 @@ def _cells_of(box, shape, inner):  # type: ignore[no-untyped-def]
     return members[:n]
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _look(members, n, box, r, first, last, inner):  # type: ignore[no-untyped-def]
     """Append the cells of a part of a row, as `_cells_of` does; return how many there are now."""
     cos, sin = math.cos(box[4]), math.sin(box[4])
@@ -228,7 +228,7 @@ def _look(members, n, box, r, first, last, inner):  # type: ignore[no-untyped-de
     return n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _base_of(height, state, labels, box, step, known):  # type: ignore[no-untyped-def]
     """Return the base of a box, -1 where it has none or less than three sides lie at it; fill the known cells a side.
 
@@ -263,13 +263,13 @@ def _base_of(height, state, labels, box, step, known):  # type: ignore[no-untype
     return base if sides >= 3 else -1
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _rise(height, state, r, c, base):  # type: ignore[no-untyped-def]
     """Return how high a cell lies above the base, centimetres."""
     return height[r, c] - base if state[r, c] == HIGH else -base
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lower_one(height, state, roofs, labels, sizes, box, step):  # type: ignore[no-untyped-def]
     known = np.zeros(4, dtype=np.int64)
     base = _base_of(height, state, labels, box, step, known)
@@ -318,7 +318,7 @@ def _lower_one(height, state, roofs, labels, sizes, box, step):  # type: ignore[
         _flatten(height, state, labels, cells, base, step, storey, least, box)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _keep_carried(roofs, labels, cells, base, step, storey, least):  # type: ignore[no-untyped-def]
     """Unmark storeys that stand on a roof of another level than the base, in place.
 
@@ -343,7 +343,7 @@ def _keep_carried(roofs, labels, cells, base, step, storey, least):  # type: ign
         storey[patch] = storey[patch] and balance[patch] >= 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _flatten(height, state, labels, cells, base, step, storey, least, box):  # type: ignore[no-untyped-def]
     """Lower storeys, and walls and furniture above the base, to the plane of the base."""
     n, x, y, xx, xy, yy, h, xh, yh = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -16,8 +16,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ...core.kernels import kernel
 from .random_stream import gaussian, integer, uniform
 
 __all__ = [
@@ -36,7 +35,7 @@ MOVES = ("birth", "death", "shift", "edge", "side", "turn", "split", "merge")
 GAP, OFFSET, SKEW = 2.0, 4.0, 0.08
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def birth_log_ratio(delta, temperature, density, count, q, log_birth, log_death):  # type: ignore[no-untyped-def]
     """Return the log acceptance ratio of a birth into `count` buildings; that of the death back is its negative.
 
@@ -55,7 +54,7 @@ def birth_log_ratio(delta, temperature, density, count, q, log_birth, log_death)
     return -delta / temperature + math.log(density / ((count + 1) * q)) + log_death - log_birth
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def propose_change(kind, old, new, state):  # type: ignore[no-untyped-def]
     """Fill `new` by a symmetric walk from `old`: kind 2 shift, 3 edge, 4 side, 5 turn (see `MOVES`)."""
     new[:] = old
@@ -83,7 +82,7 @@ def propose_change(kind, old, new, state):  # type: ignore[no-untyped-def]
         new[4] = (new[4] + 0.03 * scale * gaussian(state)) % math.pi
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def split_rectangle(parent, axis, m, g, p, q, phi, first, second):  # type: ignore[no-untyped-def]
     """Fill the two parts of a parent split along `axis` (0: along u, 1: along v); m is measured from its centre."""
     e, f = 0.5 * parent[2 + axis], 0.5 * parent[3 - axis]
@@ -103,7 +102,7 @@ def split_rectangle(parent, axis, m, g, p, q, phi, first, second):  # type: igno
         child[4] = (parent[4] + sign * phi) % math.pi
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def merge_rectangles(first, second, axis, parent, auxiliary):  # type: ignore[no-untyped-def]
     """Fill the parent whose split along `axis` gives the two, and m, g, p, q, phi; return whether there is one."""
     turn = (first[4] - second[4] + 0.5 * math.pi) % math.pi - 0.5 * math.pi
@@ -140,7 +139,7 @@ def merge_rectangles(first, second, axis, parent, auxiliary):  # type: ignore[no
     return parent[2] > 0.0 and parent[3] > 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def split_log_ratio(delta, temperature, density, count, side, near_first, near_second):  # type: ignore[no-untyped-def]
     """Return the log acceptance ratio of a split, both moves tried equally often; of the merge back its negative.
 

@@ -21,9 +21,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .cells import VOID
 from .workers import ALONE, Workers
 
@@ -61,7 +61,7 @@ def label_patches(
     return labels, count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _label_rows(height, mask, step, first, last, labels, parent):  # type: ignore[no-untyped-def]
     """Label the patches of some rows, some with several numbers that `parent` joins; return first row, last number."""
     columns = height.shape[1]
@@ -87,7 +87,7 @@ def _label_rows(height, mask, step, first, last, labels, parent):  # type: ignor
     return first, number
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _unite(parent, one, other):  # type: ignore[no-untyped-def]
     """Join two numbers; return the smallest of what now belongs together."""
     while parent[one] != one:
@@ -101,7 +101,7 @@ def _unite(parent, one, other):  # type: ignore[no-untyped-def]
     return root
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _join_rows(height, labels, step, row, parent):  # type: ignore[no-untyped-def]
     """Join what touches across the border above a row."""
     for c in range(labels.shape[1]):
@@ -109,7 +109,7 @@ def _join_rows(height, labels, step, row, parent):  # type: ignore[no-untyped-de
             _unite(parent, labels[row - 1, c], labels[row, c])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_off(parent, bands, columns):  # type: ignore[no-untyped-def]
     """Put labels in the place of parents; return how many there are."""
     count = 0
@@ -124,7 +124,7 @@ def _count_off(parent, bands, columns):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _relabel(labels, parent, first, last):  # type: ignore[no-untyped-def]
     for r in range(first, last):
         for c in range(labels.shape[1]):
@@ -154,7 +154,7 @@ def cells_of_patches(
     return cells, ends
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _tally(labels, count, first, last):  # type: ignore[no-untyped-def]
     """Return how many cells of some rows have each label; none are counted for 0."""
     tally = np.zeros(count + 1, dtype=np.int64)
@@ -165,7 +165,7 @@ def _tally(labels, count, first, last):  # type: ignore[no-untyped-def]
     return tally
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sort_cells(labels, first, last, place, cells):  # type: ignore[no-untyped-def]
     """Write the cells of some rows to the places of their labels, which are moved on."""
     for r in range(first, last):
@@ -232,7 +232,7 @@ def count_rims(
     return Rims(*np.sum(workers.bands(work, len(patches)), axis=0))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _go_round(patches, count, height, state, roof, fall, first, last):  # type: ignore[no-untyped-def]
     """Return cells, length of the rim and roof on it, shape (3, count + 1), of the cells of some rows."""
     rows, columns = patches.shape

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ...core.kernels import kernel
 from .energy import energy_below, least_energy, overlaps, own_energy
 
 __all__ = ["hull", "polish"]
@@ -27,12 +27,12 @@ _HOUSE, _HALL = 200.0, 500.0
 _WALLS = 32
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _shared(rectangles, count, fixed, rectangle, skip, other):  # type: ignore[no-untyped-def]
     return overlaps(rectangles, count, rectangle, skip, other) + overlaps(fixed, len(fixed), rectangle, -1, -1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _allowed(rectangle, window, model):  # type: ignore[no-untyped-def]
     return (
         window[0] <= rectangle[0] < window[2]
@@ -42,7 +42,7 @@ def _allowed(rectangle, window, model):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _change(rectangle, kind, step, new):  # type: ignore[no-untyped-def]
     """Fill one of 14 small changes: 0..7 an edge out or in, 8..11 a shift along u or v, 12, 13 a turn."""
     new[:] = rectangle
@@ -65,7 +65,7 @@ def _change(rectangle, kind, step, new):  # type: ignore[no-untyped-def]
     new[1] += du * sin + dv * cos
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _descend(small, large, model, window, rectangles, own, count, fixed, i):  # type: ignore[no-untyped-def]
     """Change building i as long as it helps, with steps of 4 cells down to a quarter; return the gain."""
     gained, step = 0.0, 4.0
@@ -93,7 +93,7 @@ def _descend(small, large, model, window, rectangles, own, count, fixed, i):  # 
     return gained
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _part(parent, axis, low, high, child):  # type: ignore[no-untyped-def]
     """Fill the part of a rectangle between two positions along an axis, measured from its centre."""
     child[:] = parent
@@ -104,7 +104,7 @@ def _part(parent, axis, low, high, child):  # type: ignore[no-untyped-def]
     child[2 + axis] = high - low
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _split(small, large, model, window, rectangles, own, count, fixed, i):  # type: ignore[no-untyped-def]
     """Put the best wall into building i where it lowers the energy; return the gain."""
     parent = rectangles[i].copy()
@@ -153,7 +153,7 @@ def _split(small, large, model, window, rectangles, own, count, fixed, i):  # ty
     return before - after
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def hull(first, second, merged):  # type: ignore[no-untyped-def]
     """Fill the rectangle at the angle of the first that holds both."""
     cos, sin = math.cos(first[4]), math.sin(first[4])
@@ -171,7 +171,7 @@ def hull(first, second, merged):  # type: ignore[no-untyped-def]
     merged[2], merged[3], merged[4] = high_u - low_u, high_v - low_v, first[4]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _merge(small, large, model, window, rectangles, own, count, fixed, i):  # type: ignore[no-untyped-def]
     """Merge building i with the neighbour with which that gains most; return the gain and the neighbour or -1."""
     best_gain, best_j = _GAIN, -1
@@ -211,7 +211,7 @@ def _merge(small, large, model, window, rectangles, own, count, fixed, i):  # ty
     return best_gain, best_j
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _replace(model, rectangles, own, fresh, count, fixed, boxes, alones):  # type: ignore[no-untyped-def]
     """Put boxes in the place of the buildings that they overlap where that lowers the energy; return gain and count."""
     gained = 0.0
@@ -252,12 +252,12 @@ def _replace(model, rectangles, own, fresh, count, fixed, boxes, alones):  # typ
     return gained, count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _remove(rectangles, own, count, j):  # type: ignore[no-untyped-def]
     rectangles[j], own[j] = rectangles[count - 1], own[count - 1]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _joined(first, second, axis, joined):  # type: ignore[no-untyped-def]
     """Fill the rectangle at the angle of the first that reaches over both along an axis, and is as wide as both are.
 
@@ -283,7 +283,7 @@ def _joined(first, second, axis, joined):  # type: ignore[no-untyped-def]
     joined[3 - axis] = high - low
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _absorb(small, large, model, window, rectangles, own, fresh, count, fixed, i, spare):  # type: ignore[no-untyped-def]
     """Let building i take in a smaller neighbour, and all that lies mostly in both, where that lowers the energy.
 
@@ -334,7 +334,7 @@ def _absorb(small, large, model, window, rectangles, own, fresh, count, fixed, i
     return 0.0, count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def polish(small, large, model, window, start, fixed, boxes, energies, capacity, sweeps):  # type: ignore[no-untyped-def]
     """Lower the energy of a state until a sweep changes nothing or `sweeps` are done.
 

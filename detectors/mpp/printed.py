@@ -14,9 +14,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.points import PointCloud
 from .cells import HIGH
 from .preparation import Prepared
@@ -75,7 +75,7 @@ def _normal(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(values.mean()), max(float(values.std()), 0.1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _cells(rectangle, rows, columns, mask, value):  # type: ignore[no-untyped-def]
     """Write a value into the mask for all cells of a rectangle; return rows and columns that were touched."""
     half_a, half_b = 0.5 * rectangle[2], 0.5 * rectangle[3]
@@ -92,7 +92,7 @@ def _cells(rectangle, rows, columns, mask, value):  # type: ignore[no-untyped-de
     return top, bottom, left, right
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sums(rectangle, points, mask, out):  # type: ignore[no-untyped-def]
     """Fill n, sum z, sum z2 of a rectangle."""
     rows, columns = points.shape[0], points.shape[1]
@@ -106,7 +106,7 @@ def _sums(rectangle, points, mask, out):  # type: ignore[no-untyped-def]
                 mask[r, c] = 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _difference(first, second, points, mask, out):  # type: ignore[no-untyped-def]
     """Fill n, sum z, sum z2 of the cells of the first rectangle that are not in the second."""
     rows, columns = points.shape[0], points.shape[1]
@@ -122,14 +122,14 @@ def _difference(first, second, points, mask, out):  # type: ignore[no-untyped-de
     _cells(first, rows, columns, mask, -1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _log_likelihood(sums, mean, spread):  # type: ignore[no-untyped-def]
     """Log-likelihood of n points with these sums under one Gaussian (equation 2)."""
     squares = sums[2] - 2.0 * mean * sums[1] + mean * mean * sums[0]
     return -sums[0] * math.log(math.sqrt(2.0 * math.pi) * spread) - 0.5 * squares / (spread * spread)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _matching(sums, mean, spread):  # type: ignore[no-untyped-def]
     """Share of points within two standard deviations of a building's height."""
     if sums[0] == 0.0:
@@ -140,7 +140,7 @@ def _matching(sums, mean, spread):  # type: ignore[no-untyped-def]
     return 0.5 * (math.erf(upper / width) - math.erf(lower / width))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _log_prior(building, prior):  # type: ignore[no-untyped-def]
     """Gaussian log-priors of length, width, height mean and height spread; place and angle are uniform."""
     total = 0.0
@@ -150,7 +150,7 @@ def _log_prior(building, prior):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def run_printed(points, classes, prior, steps, sides, state, iterations, ratio, capacity, stride):  # type: ignore[no-untyped-def]
     """Run the printed algorithm.
 

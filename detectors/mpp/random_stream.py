@@ -11,8 +11,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ...core.kernels import kernel
 
 __all__ = ["gaussian", "integer", "stream", "uniform"]
 
@@ -23,12 +24,12 @@ def stream(entropy: Sequence[int]) -> NDArray[np.uint64]:
     return words.astype(np.uint64)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _left(word, bits):  # type: ignore[no-untyped-def]
     return (word << np.uint64(bits)) | (word >> np.uint64(64 - bits))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def uniform(state):  # type: ignore[no-untyped-def]
     """Draw from [0, 1) with 53 random bits and advance the state."""
     result = _left(state[0] + state[3], 23) + state[0]
@@ -42,13 +43,13 @@ def uniform(state):  # type: ignore[no-untyped-def]
     return np.float64(result >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def integer(state, size):  # type: ignore[no-untyped-def]
     """Draw from 0 .. size - 1."""
     return min(int(uniform(state) * size), size - 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def gaussian(state):  # type: ignore[no-untyped-def]
     """Draw from the standard normal distribution (Box and Muller; the second value is not kept)."""
     radius = math.sqrt(-2.0 * math.log(1.0 - uniform(state)))

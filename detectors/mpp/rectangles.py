@@ -15,9 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.raster import Grid
 
 __all__ = ["corners", "inside_any", "overlap_area", "row_span", "to_grid_frame", "to_world"]
@@ -49,7 +49,7 @@ def to_grid_frame(quadrilaterals: NDArray[np.float64], grid: Grid) -> NDArray[np
     return np.concatenate([place.mean(axis=1), sides], axis=1)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def row_span(dy, half_a, half_b, cos, sin):  # type: ignore[no-untyped-def]
     """Return the interval of x - centre x, inside the rectangle, of the line at y - centre y = dy; lo > hi when none.
 
@@ -69,7 +69,7 @@ def row_span(dy, half_a, half_b, cos, sin):  # type: ignore[no-untyped-def]
     return lo, hi
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def overlap_area(first, second):  # type: ignore[no-untyped-def]
     """Return the common area of two rectangles in cells squared.
 
@@ -128,7 +128,7 @@ def inside_any(rectangles: NDArray[np.float64], shape: tuple[int, int]) -> NDArr
     return mask
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill(rectangles, mask):  # type: ignore[no-untyped-def]
     rows, columns = mask.shape
     for k in range(len(rectangles)):

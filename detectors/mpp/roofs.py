@@ -20,8 +20,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ...core.kernels import kernel
 from .tables import MILLI, part_sums
 
 __all__ = [
@@ -46,13 +46,13 @@ KINDS = ("flat", "plane", "gable", "gable", "hip")
 _STEEP = 0.12
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _first_cell(x):  # type: ignore[no-untyped-def]
     """Index of the first cell whose centre is not left of x, for x > -1e6 (a ceiling that compiles to one step)."""
     return 1048576 - int(1048576.5 - x)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lines(rectangle):  # type: ignore[no-untyped-def]
     """Return cos, sin and half the height of a rectangle, and slope and reach in x of the strips that it is made of.
 
@@ -69,7 +69,7 @@ def _lines(rectangle):  # type: ignore[no-untyped-def]
     return cos, sin, tall, slope_u, reach_u, slope_v, reach_v
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def scan(small, large, rectangle):  # type: ignore[no-untyped-def]
     """Add up the cells of a rectangle.
 
@@ -142,7 +142,7 @@ def scan(small, large, rectangle):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _with_part(sums, small, large, row, begin, end, x0, y0):  # type: ignore[no-untyped-def]
     """Return the sums of 1, x, y, h, xh and yh, those over a part of a row added; nothing where it is empty."""
     if end <= begin:
@@ -153,7 +153,7 @@ def _with_part(sums, small, large, row, begin, end, x0, y0):  # type: ignore[no-
     return n + n_r, x + x_r, y + j * n_r, h + h_r, xh + xh_r, yh + j * h_r
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def scan_halves(small, large, rectangle):  # type: ignore[no-untyped-def]
     """Return the sums of u and uh over the cells with u > 0, and of v and vh over those with v > 0."""
     rows, columns = small.shape[0], small.shape[1] - 1
@@ -199,7 +199,7 @@ def scan_halves(small, large, rectangle):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _scan_hip(small, large, rectangle):  # type: ignore[no-untyped-def]
     """Return the sums of t, tt and th of a hip roof, t = max(|v|, |u| - ridge), the rectangle given with a >= b."""
     rows, columns = small.shape[0], small.shape[1] - 1
@@ -260,14 +260,14 @@ def _scan_hip(small, large, rectangle):  # type: ignore[no-untyped-def]
     return t, tt, th
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def log_likelihood(n, residual, least_tau):  # type: ignore[no-untyped-def]
     """Gaussian log-likelihood of n heights whose squared residuals sum up to `residual`, tau profiled; 0 of none."""
     variance = max(residual / max(n, 1.0), least_tau * least_tau)
     return -0.5 * n * math.log(2.0 * math.pi * variance) - 0.5 * residual / variance
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _ridge_residual(n, t, tt, h, th, level):  # type: ignore[no-untyped-def]
     """Residual of h = m - s t with s > 0, and s; the flat residual `level` when the roof does not fall outwards."""
     spread = tt - t * t / n
@@ -279,7 +279,7 @@ def _ridge_residual(n, t, tt, h, th, level):  # type: ignore[no-untyped-def]
     return max(level - slope * slope * spread, 0.0), -slope
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _plane_residual(n, u, v, uu, uv, vv, h, uh, vh, level):  # type: ignore[no-untyped-def]
     """Residual of the best plane."""
     uu, uv, vv = uu - u * u / n, uv - u * v / n, vv - v * v / n
@@ -291,7 +291,7 @@ def _plane_residual(n, u, v, uu, uv, vv, h, uh, vh, level):  # type: ignore[no-u
     return max(level - explained, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def choose_roof(small, large, rectangle, moments, roof_price, least_tau, explained, least_height, cell, needed):  # type: ignore[no-untyped-def]
     """Choose the roof of a rectangle from its moments.
 
@@ -350,7 +350,7 @@ def choose_roof(small, large, rectangle, moments, roof_price, least_tau, explain
     return best, residual, kind, slope
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fit_roof(small, large, rectangle, roof_price, least_tau, explained, least_height, cell, fit):  # type: ignore[no-untyped-def]
     """Choose the roof of a rectangle.
 
@@ -390,7 +390,7 @@ def fit_roof(small, large, rectangle, roof_price, least_tau, explained, least_he
     return best, moments[0], moments[1]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _hip_residual(small, large, rectangle, n, h, level):  # type: ignore[no-untyped-def]
     longer = rectangle.copy()
     if longer[2] < longer[3]:

@@ -8,9 +8,9 @@ Each round goes by what the one before left, so the order in which cells are loo
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .cells import HIGH
 from .workers import ALONE, Workers
 
@@ -41,7 +41,7 @@ def smooth_walls(
         _further_rounds(height, state, labels, np.concatenate(taken))
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _look(height, labels, r, c, taken, found):  # type: ignore[no-untyped-def]
     """Append a rough cell with the label and height that it takes, if it takes any; return how many are taken."""
     known, nearest, label, carrier = 0, np.int64(1) << 40, 0, 0
@@ -58,7 +58,7 @@ def _look(height, labels, r, c, taken, found):  # type: ignore[no-untyped-def]
     return found + 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _first_round(height, state, labels, first, last):  # type: ignore[no-untyped-def]
     """Return row, column, label and height of the cells of some rows that are taken first."""
     rows, columns = labels.shape
@@ -72,7 +72,7 @@ def _first_round(height, state, labels, first, last):  # type: ignore[no-untyped
     return taken[:found].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _further_rounds(height, state, labels, taken):  # type: ignore[no-untyped-def]
     """Take the cells of the first round, then those of all others: only beside what was taken anything has changed."""
     rows, columns = labels.shape

@@ -17,8 +17,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ...core.kernels import kernel
 from .births import birth_density, propose_birth
 from .energy import configuration_energy, energy_below, least_energy, overlaps, own_energy
 from .moves import (
@@ -41,7 +41,7 @@ TRACE_COLUMNS = 20
 _BIRTH, _DEATH, _SHIFT, _EDGE, _SIDE, _TURN, _SPLIT, _MERGE = 0, 1, 2, 3, 4, 5, 6, 7
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _inside(rectangle, births):  # type: ignore[no-untyped-def]
     """Whether the target is positive: centre in the window, sides in their range."""
     w, s = births.window, births.sides
@@ -53,7 +53,7 @@ def _inside(rectangle, births):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _neighbours(rectangles, count, i, reach):  # type: ignore[no-untyped-def]
     """How many others lie with their centre within reach of building i."""
     near = 0
@@ -64,7 +64,7 @@ def _neighbours(rectangles, count, i, reach):  # type: ignore[no-untyped-def]
     return near
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _pick_neighbour(rectangles, count, i, reach, number):  # type: ignore[no-untyped-def]
     """Index of the neighbour of building i with this number, in order of index."""
     for j in range(count):
@@ -76,12 +76,12 @@ def _pick_neighbour(rectangles, count, i, reach, number):  # type: ignore[no-unt
     return -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _common(rectangles, count, fixed, rectangle, skip, other):  # type: ignore[no-untyped-def]
     return overlaps(rectangles, count, rectangle, skip, other) + overlaps(fixed, len(fixed), rectangle, -1, -1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def run_chain(  # type: ignore[no-untyped-def]
     small,
     large,

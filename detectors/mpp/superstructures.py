@@ -19,9 +19,9 @@ as a building of its own.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .candidates import propose_boxes
 from .cells import HIGH, LOW
 from .frames import lower_storeys
@@ -120,7 +120,7 @@ def _lower_storeys(
     return lowered, filled
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _add_shadows(state, first, last, solid):  # type: ignore[no-untyped-def]
     """Add the runs of void cells between two high ones of a row, in place: shadows of towers."""
     for r in range(first, last):
@@ -134,7 +134,7 @@ def _add_shadows(state, first, last, solid):  # type: ignore[no-untyped-def]
                 high = -_SHADOW
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _add_ledges(height, state, roof, first, last, solid):  # type: ignore[no-untyped-def]
     """Fill for some rows which cells are roof or, if high, share their height with four of their eight neighbours.
 
@@ -210,14 +210,14 @@ def _sink(
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _choose(patches, sinking, first, last, waiting):  # type: ignore[no-untyped-def]
     for r in range(first, last):
         for c in range(patches.shape[1]):
             waiting[r, c] = _WAITING if sinking[patches[r, c]] else _DONE
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _outer_ring(height, labels, waiting, first, last, above):  # type: ignore[no-untyped-def]
     """Return row and column of the waiting cells of some rows that have roof beside them."""
     # Laid out for the worst case; only what is written takes memory.
@@ -231,7 +231,7 @@ def _outer_ring(height, labels, waiting, first, last, above):  # type: ignore[no
     return ring[:size].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sink_rings(height, labels, waiting, ring, above):  # type: ignore[no-untyped-def]
     """Let waiting cells sink, in place, one ring at a time, so that no direction is favoured."""
     rows, columns = height.shape
@@ -258,7 +258,7 @@ def _sink_rings(height, labels, waiting, ring, above):  # type: ignore[no-untype
         ring = inner[:size]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _beside(height, labels, waiting, r, c, above):  # type: ignore[no-untyped-def]
     """Mean height of the roof among a cell's eight neighbours, of the level that most of them share; -1 without one."""
     rows, columns = height.shape

@@ -22,9 +22,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .workers import ALONE, Workers
 
 __all__ = ["LONGEST", "MILLI", "NO_TABLES", "TALLEST", "Tables", "make_tables", "part_sums"]
@@ -77,7 +77,7 @@ def make_tables(
     return Tables(small, large)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def part_sums(small, large, row, first, last, x0):  # type: ignore[no-untyped-def]
     """Return n, sums of x, xx, h, xh, hh of the cells first..last of a row, x counted from column x0."""
     n = np.int64(small[row, last, 0]) - small[row, first, 0]
@@ -96,7 +96,7 @@ def part_sums(small, large, row, first, last, x0):  # type: ignore[no-untyped-de
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sum_rows(height, high, score, first, last, small, large):  # type: ignore[no-untyped-def]
     columns = height.shape[1]
     for r in range(first, last):

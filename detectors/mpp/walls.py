@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ...core.kernels import kernel
 from .energy import energy_below, overlaps, own_energy
 
 __all__ = ["close_walls"]
@@ -23,7 +23,7 @@ _REACH, _STEPS, _HALVINGS = 1.25, 10, 8
 _CONTACT = 1e-3
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _moved(rectangle, edge, by, new):  # type: ignore[no-untyped-def]
     """Fill the rectangle with one edge (0, 1: ends of u; 2, 3: ends of v) moved outwards by some cells."""
     new[:] = rectangle
@@ -35,7 +35,7 @@ def _moved(rectangle, edge, by, new):  # type: ignore[no-untyped-def]
     new[1] += shift * (sin if axis == 0 else cos)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def close_walls(small, large, model, rectangles, tolerance):  # type: ignore[no-untyped-def]
     """Move the edges of rectangles, shape (n, 5), in place, one building after the other.
 
@@ -58,7 +58,7 @@ def close_walls(small, large, model, rectangles, tolerance):  # type: ignore[no-
             _out(small, large, model, rectangles, i, others[:count], edge, tolerance, new)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _neighbours(rectangles, i, others):  # type: ignore[no-untyped-def]
     """Fill `others` with the buildings that building i can meet when its edges move; return their number."""
     count = 0
@@ -72,7 +72,7 @@ def _neighbours(rectangles, i, others):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _back(small, large, model, rectangles, i, others, edge, tolerance, new):  # type: ignore[no-untyped-def]
     """Move an edge back where that takes away most of the common area within reach."""
     shared = overlaps(others, len(others), rectangles[i], -1, -1)
@@ -94,7 +94,7 @@ def _back(small, large, model, rectangles, i, others, edge, tolerance, new):  # 
         rectangles[i] = new
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _out(small, large, model, rectangles, i, others, edge, tolerance, new):  # type: ignore[no-untyped-def]
     """Move an edge out to the first contact within reach."""
     base = overlaps(others, len(others), rectangles[i], -1, -1)

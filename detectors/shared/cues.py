@@ -23,9 +23,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
 
@@ -172,7 +172,7 @@ def _share(part: _Floats, whole: _Floats) -> _Floats:
     return np.where(whole > 0, part / np.maximum(whole, np.float32(1)), np.float32(np.nan))
 
 
-@njit(cache=True)
+@kernel
 def _moments(x, y, z, index, chosen, middle, base, shape):  # type: ignore[no-untyped-def]
     """Return n, x, y, z, xx, xy, yy, xz, yz, zz of the chosen points in their cells `index`, from a middle and base."""
     sums = np.zeros((10, shape[0] * shape[1]))
@@ -224,7 +224,7 @@ def _smoothest_plane(
     return smoothest
 
 
-@njit(cache=True)
+@kernel
 def _plane_deviation(moments):  # type: ignore[no-untyped-def]
     """Return the standard deviation about the least-squares plane, `_NO_PLANE` where the points determine none."""
     _, rows, columns = moments.shape

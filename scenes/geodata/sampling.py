@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ...core.kernels import kernel
 
 __all__ = ["bilinear"]
 
 
-@njit(cache=True)
+@kernel
 def bilinear(
     values: NDArray[np.float32],
     west: float,

@@ -22,9 +22,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation, Grid
 from .lowest_points import default_cell, lowest_surface, mean_above
@@ -172,7 +172,7 @@ def _blocks(values: _Floats) -> _Floats:
     return values[::2, ::2] + values[1::2, ::2] + values[::2, 1::2] + values[1::2, 1::2]
 
 
-@njit(cache=True)
+@kernel
 def _relax(values, known, rounds):  # type: ignore[no-untyped-def]
     """Move unknown cells to the mean of their neighbours, in place, `rounds` sweeps in alternating order."""
     rows, columns = values.shape

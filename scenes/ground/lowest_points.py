@@ -16,9 +16,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.raster import Elevation, Grid
 
 __all__ = ["coverage", "default_cell", "lowest_surface", "mean_above"]
@@ -32,7 +32,7 @@ _SUPPORT_HEIGHT, _SUPPORT, _SUPPORT_SHARE = 1.0, 3, 0.05
 _CHUNK = 1 << 18
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def coverage(x, y, west, north, side, rows, columns):  # type: ignore[no-untyped-def]
     """Return which squares of a grid hold a point, shape (rows, columns), and how many points lie in any.
 
@@ -82,14 +82,14 @@ def lowest_surface(x: _Coordinates, y: _Coordinates, z: _Coordinates, grid: Grid
     return _lowest_supported(heights, start, grid.rows, grid.columns)  # type: ignore[no-any-return]
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def _cell_of(x, y, west, north, side, rows, columns):  # type: ignore[no-untyped-def]
     """Return the flat cell of a place, -1 outside."""
     row, column = (north - y) / side, (x - west) / side
     return int(row) * columns + int(column) if 0 <= row < rows and 0 <= column < columns else -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count(x, y, west, north, side, rows, columns, counts):  # type: ignore[no-untyped-def]
     """Count the points of each cell, in the place after its own."""
     for i in range(len(x)):
@@ -98,7 +98,7 @@ def _count(x, y, west, north, side, rows, columns, counts):  # type: ignore[no-u
             counts[k + 1] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _group(x, y, z, west, north, side, rows, columns, start, heights):  # type: ignore[no-untyped-def]
     """Write the heights cell by cell; afterwards as before, cell c begins at ``start[c]``."""
     for i in range(len(x)):
@@ -111,7 +111,7 @@ def _group(x, y, z, west, north, side, rows, columns, start, heights):  # type: 
     start[0] = 0
 
 
-@njit(cache=True)
+@kernel
 def _lowest_supported(heights, start, rows, columns):  # type: ignore[no-untyped-def]
     """Lowest supported height per cell; `heights` is grouped by cell, cell c holds ``start[c]:start[c + 1]``."""
     lowest = np.full((rows, columns), np.nan, dtype=np.float32)
@@ -132,7 +132,7 @@ def _lowest_supported(heights, start, rows, columns):  # type: ignore[no-untyped
     return lowest
 
 
-@njit(cache=True)
+@kernel
 def _supported(heights, start, rows, columns, row, column, height):  # type: ignore[no-untyped-def]
     support, around = 0, 0
     for r in range(max(row - 2, 0), min(row + 3, rows)):
@@ -170,7 +170,7 @@ def mean_above(
     return mean
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _add_near(x, y, above, tolerance, west, north, side, rows, columns, count, total):  # type: ignore[no-untyped-def]
     for i in range(len(x)):
         k = _cell_of(x[i], y[i], west, north, side, rows, columns)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.raster import Grid
 from .clutter import Cover
 from .layout import FIELDS, HALLS, PARK, TOWERS, zone_of
@@ -47,7 +47,7 @@ def cover_codes(world: World, grid: Grid) -> NDArray[np.uint8]:
     return codes
 
 
-@njit(cache=True)
+@kernel
 def _streets(
     codes: NDArray[np.uint8],
     frame: tuple[float, float, float],
@@ -109,7 +109,7 @@ def _streets(
                 codes[r, c] = grass
 
 
-@njit(cache=True)
+@kernel
 def _street_code(main: float, street: float, side: float, cross: float, zone: int) -> int:
     """Cross section from the parcel front: footpath, verge, carriageway; downtown has wide pavements instead."""
     pavement = 4.0 if zone == TOWERS else 3.4
@@ -122,7 +122,7 @@ def _street_code(main: float, street: float, side: float, cross: float, zone: in
     return GRASS + 22
 
 
-@njit(cache=True)
+@kernel
 def _parcel_number(block: int, row: int, along: float, across: float, pattern: NDArray[np.float64], zone: int) -> int:
     """Return a number of the parcel that no other parcel near has; a park is one parcel."""
     usable = pattern[1] - pattern[3]
@@ -135,7 +135,7 @@ def _parcel_number(block: int, row: int, along: float, across: float, pattern: N
     return ((block & 0xFFFF) << 32) | ((row & 0xFFFF) << 16) | ((lot & 0xFF) << 1) | half
 
 
-@njit(cache=True)
+@kernel
 def _parcel_code(number: int, key: int, zone: int, dryness: float) -> int:
     """Grass of a parcel, drier on some; earth on a few."""
     draw, bare = uniform(key, number), uniform(key, number + (1 << 60))
@@ -145,7 +145,7 @@ def _parcel_code(number: int, key: int, zone: int, dryness: float) -> int:
     return GRASS + int(dry * 63)
 
 
-@njit(cache=True)
+@kernel
 def _field_code(block: int, row: int, along: float, across: float, pattern: NDArray[np.float64], key: int) -> int:
     """Crop of a field: strips of a block are meadow, stubble, ploughed, maize or vines."""
     strip = int(across / pattern[0] * 3.0) if uniform(key, block * 31 + row) < 0.5 else int(along / pattern[1] * 3.0)
@@ -155,7 +155,7 @@ def _field_code(block: int, row: int, along: float, across: float, pattern: NDAr
     return _STUBBLE if draw < 0.68 else _EARTH if draw < 0.8 else _MAIZE if draw < 0.92 else _VINES
 
 
-@njit(cache=True)
+@kernel
 def _patches(codes: NDArray[np.uint8], frame: tuple[float, float, float], patches: NDArray[np.float64]) -> None:
     west, north, gsd = frame
     for k in range(len(patches)):

@@ -18,9 +18,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.raster import Elevation, Grid
 from .recipe import SceneParameters
 from .streams import counter_key, fractal_field, stream, uniform
@@ -93,7 +93,7 @@ class Layout:
         return raster.sample(inside_x, inside_y) + along[0] * (x - inside_x) + along[1] * (y - inside_y)
 
 
-@njit(cache=True)
+@kernel
 def locate(u: float, v: float, pattern: NDArray[np.float64], key: int) -> tuple[int, int, float, float]:
     """Return block number, row number, and the position in the block: along from its start, across from its street."""
     row = math.floor((v - pattern[5]) / pattern[0])
@@ -103,7 +103,7 @@ def locate(u: float, v: float, pattern: NDArray[np.float64], key: int) -> tuple[
     return int(block), int(row), shifted - block * pattern[1], across
 
 
-@njit(cache=True)
+@kernel
 def zone_of(block: int, row: int, zones: NDArray[np.uint8], first: NDArray[np.int64]) -> int:
     """Return the zone of a block; blocks beyond the table are like the nearest in it."""
     i = min(max(block - first[0], 0), zones.shape[0] - 1)

@@ -19,9 +19,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.points import PointCloud
 from ..geodata.raster import Grid
 from .clutter import Cover
@@ -143,7 +143,7 @@ def _strips_over(
     return float((1.0 + (between - offset < half)).mean())
 
 
-@njit(cache=True)
+@kernel
 def _strip(
     span: tuple[float, float, float, float, float],
     rhythm: tuple[float, float, float],
@@ -179,7 +179,7 @@ def _strip(
     return out[:count].copy()
 
 
-@njit(cache=True)
+@kernel
 def _solid_top(
     x: float,
     y: float,
@@ -227,7 +227,7 @@ def _solid_top(
     return best, hit, where
 
 
-@njit(cache=True)
+@kernel
 def _leaf_hits(
     x: float,
     y: float,
@@ -280,7 +280,7 @@ def _leaf_hits(
     return count
 
 
-@njit(cache=True)
+@kernel
 def _scan_chunk(
     places: NDArray[np.float64],
     number: int,
@@ -363,18 +363,18 @@ def _scan_chunk(
     return xyz[:count].copy(), returns[:count].copy(), intensity[:count].copy(), classes[:count].copy()
 
 
-@njit(cache=True)
+@kernel
 def _put(echo: NDArray[np.float64], e: int, level: float, reflectance: float, asprs: float) -> None:
     echo[e, 0], echo[e, 1], echo[e, 2] = level, reflectance, asprs
 
 
-@njit(cache=True)
+@kernel
 def top_near(x: float, y: float, size: tuple[int, int], top: NDArray[np.float64]) -> float:
     """Return the highest elevation of anything in the cell of a place."""
     return top[int(y // 4.0) * size[0] + int(x // 4.0)]  # type: ignore[no-any-return]
 
 
-@njit(cache=True)
+@kernel
 def _crown_echoes(
     x: float,
     y: float,
@@ -414,7 +414,7 @@ def _crown_echoes(
     return echoes, length
 
 
-@njit(cache=True)
+@kernel
 def _edge_echo(
     x: float,
     y: float,

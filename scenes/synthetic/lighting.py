@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from .clutter import Cover
 from .palettes import GROUND, LAWNS
 from .recipe import SceneParameters
@@ -54,7 +54,7 @@ def sunlit(surface: Surface, recipe: SceneParameters) -> NDArray[np.bool_]:
     return lit
 
 
-@njit(cache=True)
+@kernel
 def _sweep(z: NDArray[np.float32], lit: NDArray[np.bool_], downwards: bool, slant: float, drop: float) -> None:
     """Walk rows in the direction of the shadows; each slanted line remembers how high its shadow still is."""
     rows, columns = z.shape
@@ -117,7 +117,7 @@ def colour_surface(
     return colours
 
 
-@njit(cache=True)
+@kernel
 def _paint(
     colours: NDArray[np.uint8],
     z: NDArray[np.float32],
@@ -180,7 +180,7 @@ def _paint(
                 colours[b, r, c] = int(min(max(albedo[b] * light * 255.0 * exposure + haze[b], 2.0), 253.0))
 
 
-@njit(cache=True)
+@kernel
 def _ground_albedo(
     albedo: NDArray[np.float64],
     code: int,
@@ -208,7 +208,7 @@ def _ground_albedo(
     return 1.0
 
 
-@njit(cache=True)
+@kernel
 def _solid_albedo(
     albedo: NDArray[np.float64],
     k: int,
@@ -252,7 +252,7 @@ def _solid_albedo(
     return max(direct, 0.1)
 
 
-@njit(cache=True)
+@kernel
 def _leaf_albedo(
     albedo: NDArray[np.float64],
     k: int,

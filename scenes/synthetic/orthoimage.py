@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.raster import Grid, Image
 from .camera import camera_position, registration_offset
 from .groundcover import cover_codes
@@ -70,7 +70,7 @@ def _kernel(sigma: float) -> NDArray[np.float32]:
     return np.array([value / total for value in half], dtype=np.float32)
 
 
-@njit(cache=True)
+@kernel
 def _block_tops(z: NDArray[np.float32], label: NDArray[np.int32]) -> NDArray[np.float64]:
     """Return the highest thing in each block of the image; far below everything where the ground is bare."""
     tops = np.full(((z.shape[0] + _BLOCK - 1) // _BLOCK, (z.shape[1] + _BLOCK - 1) // _BLOCK), -1e9)
@@ -81,7 +81,7 @@ def _block_tops(z: NDArray[np.float32], label: NDArray[np.int32]) -> NDArray[np.
     return tops
 
 
-@njit(cache=True)
+@kernel
 def _first_heights(
     tops: NDArray[np.float64],
     frame: tuple[float, float, float],
@@ -128,7 +128,7 @@ def _first_heights(
     return first
 
 
-@njit(cache=True)
+@kernel
 def _block_exit(i: int, j: int, k: int, step: float, columns: float, rows: float) -> int:
     """Return the step at which a ray that comes down is certainly still in, or just leaves, the block of (i, j).
 
@@ -144,7 +144,7 @@ def _block_exit(i: int, j: int, k: int, step: float, columns: float, rows: float
     return k - max(int(fewest), 1)
 
 
-@njit(cache=True)
+@kernel
 def _lean(
     out: NDArray[np.uint8],
     colours: NDArray[np.uint8],
@@ -215,7 +215,7 @@ def _lean(
                 _wall(out, r, c, (mark - 1) >> 3, x, y, side, tx, ty, lean, wall, base, sun, ambient, haze)
 
 
-@njit(cache=True)
+@kernel
 def _wall(
     out: NDArray[np.uint8],
     r: int,
@@ -243,7 +243,7 @@ def _wall(
         out[b, r, c] = int(min(wall[k, b] * window * light * 255.0 + haze[b], 250.0))
 
 
-@njit(cache=True)
+@kernel
 def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float, key: int) -> NDArray[np.uint8]:
     """Blur by the point spread and add noise that is the same for no two cells nor bands."""
     bands, rows, columns = values.shape
@@ -279,13 +279,13 @@ def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float
     return out
 
 
-@njit(cache=True)
+@kernel
 def _weighted(out: NDArray[np.float32], values: NDArray[np.float32], weight: float) -> None:
     for c in range(len(out)):
         out[c] = weight * values[c]
 
 
-@njit(cache=True)
+@kernel
 def _add_pair(out: NDArray[np.float32], before: NDArray[np.float32], after: NDArray[np.float32], weight: float) -> None:
     for c in range(len(out)):
         out[c] += weight * (before[c] + after[c])

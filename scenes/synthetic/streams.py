@@ -19,8 +19,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ...core.kernels import kernel
 
 __all__ = ["PARTS", "Draws", "counter_key", "fractal_field", "fractal_tile", "gauss", "stream", "uniform"]
 
@@ -74,7 +75,7 @@ def counter_key(seed: int, part: str) -> np.uint64:
     return key
 
 
-@njit(cache=True)
+@kernel
 def _mix(key: np.uint64, counter: int) -> Any:
     """Scramble (key, counter) to 64 random bits (the finaliser of the SplitMix64 generator)."""
     bits = np.uint64(key) + np.uint64(counter) * np.uint64(0x9E3779B97F4A7C15)
@@ -83,13 +84,13 @@ def _mix(key: np.uint64, counter: int) -> Any:
     return bits ^ (bits >> np.uint64(31))
 
 
-@njit(cache=True)
+@kernel
 def uniform(key: np.uint64, counter: int) -> Any:
     """Counter noise, uniform in [0, 1)."""
     return (_mix(key, counter) >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True)
+@kernel
 def gauss(key: np.uint64, counter: int) -> Any:
     """Counter noise with zero mean and unit variance: the sum of four uniforms, nearly normal, at most 3.46."""
     bits = _mix(key, counter)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.raster import Grid
 from .solids import Body
 from .world import World, ground_at
@@ -49,7 +49,7 @@ def rasterise(world: World, grid: Grid, tile: NDArray[np.float32]) -> Surface:
     return Surface(grid, z, label)
 
 
-@njit(cache=True)
+@kernel
 def _bare(
     shape: tuple[int, int],
     frame: tuple[float, float, float],
@@ -64,7 +64,7 @@ def _bare(
     return z
 
 
-@njit(cache=True)
+@kernel
 def _raise_solids(
     z: NDArray[np.float32],
     label: NDArray[np.int32],
@@ -103,7 +103,7 @@ def _raise_solids(
                     label[r, c] = 1 + 8 * k + face
 
 
-@njit(cache=True)
+@kernel
 def _raise_blobs(
     z: NDArray[np.float32],
     label: NDArray[np.int32],

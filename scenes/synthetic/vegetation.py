@@ -17,9 +17,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.raster import Elevation
 from .layout import FIELDS, Layout, locate, zone_of
 from .palettes import PALETTES, draw_colour
@@ -111,7 +111,7 @@ def _plantable(
     return free
 
 
-@njit(cache=True)
+@kernel
 def _off_road(
     u: NDArray[np.float64],
     v: NDArray[np.float64],
@@ -136,7 +136,7 @@ def rectangle_table(solids: Iterable[Solid]) -> NDArray[np.float64]:
     return np.array([(s.x, s.y, s.angle, s.length, s.width) for s in solids], dtype=np.float64).reshape(-1, 5)
 
 
-@njit(cache=True)
+@kernel
 def nearest_rectangle(
     x: NDArray[np.float64], y: NDArray[np.float64], rectangles: NDArray[np.float64]
 ) -> NDArray[np.float64]:

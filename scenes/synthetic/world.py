@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ..geodata.raster import Elevation
 from .buildings import build
 from .clutter import patch_table, scatter
@@ -70,7 +70,7 @@ def make_world(recipe: SceneParameters, seed: int) -> World:
     return World(recipe, seed, terrain, layout, Solids.of([*town.solids, *clutter]), trees, patch_table(patches))
 
 
-@njit(cache=True)
+@kernel
 def ground_at(values: NDArray[np.float32], west: float, north: float, gsd: float, x: float, y: float) -> float:
     """Bilinear elevation, clamped at the border (the kernel form of `Elevation.sample`)."""
     row = min(max((north - y) / gsd - 0.5, 0.0), values.shape[0] - 1.001)
@@ -132,7 +132,7 @@ class CellIndex:
         return cls.of(world.recipe, np.stack([x - across, y - across, x + across, y + across], axis=-1), z + up)
 
 
-@njit(cache=True)
+@kernel
 def _fill_cells(
     boxes: NDArray[np.float64], top: NDArray[np.float64], columns: int, rows: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:

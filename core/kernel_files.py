@@ -1,0 +1,109 @@
+"""Files of compiled kernels: one file an entry, named by its key, safe to share between processes.
+
+A file holds the SHA-256 of its content and then the content. It appears whole or not at all; a damaged file is removed
+and counts as absent. Reading an entry renews its date, so that cleaning removes what was not used for a month and, when
+the folder is still too large, what was not used for longest.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from pathlib import Path
+
+__all__ = ["clean", "default_folder", "load", "remove", "save"]
+
+_SUFFIX = ".kernel"
+_CHECKSUM = 32  # bytes of a SHA-256
+_DAY = 86_400.0
+#: Entries that were not used for this time are removed, s.
+_OLDEST = 30 * _DAY
+#: Size that a cleaned folder does not exceed, bytes. All kernels of one state of the code need some 30 MB.
+_LARGEST = 512_000_000
+
+
+def default_folder() -> Path:
+    """Return the folder in the user's cache.
+
+    Beside the modules the files would outlive an uninstall, and what is left of the folder then hides the package when
+    it is installed in editable mode.
+    """
+    cache = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or os.path.expanduser("~/.cache")
+    return Path(cache) / "roofbench" / "kernels"
+
+
+def load(folder: Path, name: str) -> bytes | None:
+    """Return the content of an entry, None when it is absent, unreadable or damaged."""
+    path = folder / (name + _SUFFIX)
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    if hashlib.sha256(data[_CHECKSUM:]).digest() != data[:_CHECKSUM]:
+        remove(folder, name)
+        return None
+    with contextlib.suppress(OSError):  # a cache that can only be read serves all the same
+        if time.time() - path.stat().st_mtime > _DAY:
+            os.utime(path)
+    return data[_CHECKSUM:]
+
+
+def save(folder: Path, name: str, content: bytes) -> None:
+    """Write an entry.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be made or written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(prefix="unfinished-", dir=folder)
+    try:
+        with open(handle, "wb") as file:
+            file.write(hashlib.sha256(content).digest() + content)
+        os.replace(temporary, folder / (name + _SUFFIX))
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
+def remove(folder: Path, name: str) -> None:
+    """Remove an entry if it is there and can be removed."""
+    with contextlib.suppress(OSError):
+        (folder / (name + _SUFFIX)).unlink()
+
+
+def clean(folder: Path, *, oldest: float = _OLDEST, largest: int = _LARGEST) -> None:
+    """Remove what is no longer needed: old entries, the least used of too many, and the layout of version 0.1.
+
+    Parameters
+    ----------
+    folder : Path
+    oldest : float
+        Time after the last use at which an entry goes, s.
+    largest : int
+        Size of all entries together, bytes.
+    """
+    now = time.time()
+    entries = []
+    with contextlib.suppress(OSError), os.scandir(folder) as found:
+        for item in found:
+            with contextlib.suppress(OSError):  # another process may clean at the same time
+                status = item.stat()
+                if item.name.endswith(_SUFFIX):
+                    entries.append((status.st_mtime, status.st_size, item.path))
+                elif item.name.startswith("unfinished-") and now - status.st_mtime > _DAY:
+                    os.unlink(item.path)
+    size = 0
+    for used, length, path in sorted(entries, reverse=True):
+        size += length
+        if now - used > oldest or size > largest:
+            with contextlib.suppress(OSError):
+                os.unlink(path)
+    if folder == default_folder():
+        shutil.rmtree(folder.parent / "numba", ignore_errors=True)
