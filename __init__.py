@@ -11,7 +11,6 @@ The short public API; everything is imported when it is first used, so ``import 
 from __future__ import annotations
 
 import importlib
-import os
 from typing import TYPE_CHECKING, Any
 
 from .core.package import HOMES, VERSION
@@ -34,18 +33,6 @@ if TYPE_CHECKING:
     from .scenes.importing.scene_import import import_scene
     from .scenes.scene import Scene
     from .scenes.synthetic import make_scene
-
-# Compiled kernels go to the user's cache. Beside the modules they would outlive an uninstall, and what is left of the
-# folder then hides the package when it is installed in editable mode.
-os.environ.setdefault(
-    "NUMBA_CACHE_DIR",
-    os.path.join(
-        os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or os.path.expanduser("~/.cache"),
-        "roofbench",
-        "numba",
-    ),
-)
-
 
 __all__ = [
     "Detector",

@@ -98,6 +98,7 @@ class Registry:
             return self._checked(getattr(importlib.import_module(f"{NAME}.{module}"), attribute), name)
         found = self._entry_points().get(name)
         if found is not None:
+            _never_load_stale_kernels()
             return self._checked(found.load(), name)
         raise UnknownNameError(
             f"no {self.kind} called {name!r}{nearest_hint(name, self.names())}; there are {', '.join(self.names())}"
@@ -172,6 +173,7 @@ def _load_file(path: Path, kind: str) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+    _never_load_stale_kernels()
     try:
         # Standard output is for data: what a plugin prints is a message.
         with redirect_stdout(sys.stderr):
@@ -180,3 +182,10 @@ def _load_file(path: Path, kind: str) -> ModuleType:
         del sys.modules[name]
         raise InputError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
     return module
+
+
+def _never_load_stale_kernels() -> None:
+    """Let kernels of plugins be compiled again when a kernel changes that they import from another module."""
+    from .kernels import track_dependencies_of_numba  # numba is slow to load: only where there are plugins
+
+    track_dependencies_of_numba()

@@ -1,8 +1,5 @@
 """The layout of the code: packages are listed, imports run downwards, and the public names exist."""
 
-import os
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -84,15 +81,3 @@ def test_every_public_name_is_there():
 
 def test_the_version_is_said_once():
     assert roofbench.__version__ == PROJECT["project"]["version"]
-
-
-@pytest.mark.parametrize("chosen", [None, "elsewhere"])
-def test_compiled_kernels_are_kept_outside_the_package_and_where_the_user_says(chosen, tmp_path):
-    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    environment |= {"XDG_CACHE_HOME": str(tmp_path), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    if chosen:
-        environment["NUMBA_CACHE_DIR"] = str(tmp_path / chosen)
-    code = "import numpy, roofbench.detectors.mpp.rectangles as r; print(r.overlap_area(*numpy.ones((2, 5))))"
-    subprocess.run([sys.executable, "-c", code], check=True, env=environment, cwd=tmp_path, capture_output=True)
-    kept = [path.relative_to(tmp_path).parts[0] for path in tmp_path.rglob("*.nbi")]
-    assert set(kept) == {chosen or "roofbench"}

@@ -27,9 +27,9 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numba import njit
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.footprints import Footprints
 
 __all__ = ["Outlines", "fan_areas", "outlines_of"]
@@ -109,7 +109,7 @@ def fan_areas(
     return areas
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _orientations(start: NDArray[np.int64], points: NDArray[np.float64], sign: NDArray[np.float64]) -> None:
     for i in range(len(sign)):
         low = start[i]
@@ -122,7 +122,7 @@ def _orientations(start: NDArray[np.int64], points: NDArray[np.float64], sign: N
         sign[i] = 1.0 if doubled >= 0.0 else -1.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill(
     one: Outlines, two: Outlines, first: NDArray[np.int64], second: NDArray[np.int64], areas: NDArray[np.float64]
 ) -> None:
@@ -159,7 +159,7 @@ def _fill(
         areas[pair] = shared if shared > _ROUNDING * min(one.area[i], two.area[j]) else 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _same(one: NDArray[np.float64], start: int, two: NDArray[np.float64], low: int, high: int) -> bool:
     """Return whether two outlines have the same vertices in the same order."""
     for k in range(high - low):
@@ -170,7 +170,7 @@ def _same(one: NDArray[np.float64], start: int, two: NDArray[np.float64], low: i
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _spread(points: NDArray[np.float64], low: int, high: int, x: float, y: float, fan: NDArray[np.float64]) -> int:
     """Write the triangles of a fan: two corners counter-clockwise, twice the area, the sign. Return their number."""
     count = 0
@@ -190,7 +190,7 @@ def _spread(points: NDArray[np.float64], low: int, high: int, x: float, y: float
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _against(ux: float, uy: float, vx: float, vy: float, turn: float, fan: NDArray[np.float64], count: int) -> float:
     """Return twice the signed area that the triangle (O, u, v) shares with all triangles of a fan."""
     total = 0.0
