@@ -30,7 +30,7 @@ from ..evaluators.registry import make_evaluator
 from ..scenes.scene import Scene
 from .identity.recipes import SceneRecipe, label_of, preset_names
 
-__all__ = ["Entrant", "Suite", "named_suite", "read_suite", "scenes_of", "suite_names"]
+__all__ = ["Entrant", "Suite", "named_suite", "read_suite", "scenes_of", "suite_names", "suite_of_words"]
 
 _TABLES = ("scenes", "detectors", "evaluators")
 _DEFAULT_EVALUATOR = "threshold-free"
@@ -139,17 +139,59 @@ def scenes_of(words: Iterable[str]) -> tuple[SceneRecipe, ...]:
         else:
             name, values = parse_selection(word)
             if name not in preset_names():
+                known = [*preset_names(), *suite_names(), *(file.parent.name for file in Path().glob("*/scene.toml"))]
                 raise UnknownNameError(
-                    f"{word!r} is no scene folder and no preset{nearest_hint(name, preset_names())}; "
-                    f"the presets are {', '.join(preset_names())}"
+                    f"{word!r} is no scene folder, preset or suite{nearest_hint(name, known)}; "
+                    f"the presets are {', '.join(preset_names())}, the suites {', '.join(suite_names())}"
                 )
             parameters = {key: _number(value) for key, value in values.items()}
-            seed = parameters.pop("seed", 0)
+            seed = parameters.pop("seed", 1)
             if not isinstance(seed, int):
                 raise ParameterError(f"{word}: seed must be a whole number, not {seed!r}")
             recipe = SceneRecipe.of_preset(name, seed=seed, parameters=parameters)
         recipes[recipe.name] = recipe
     return tuple(recipes.values())
+
+
+def suite_of_words(
+    words: Sequence[str] | None = None,
+    detectors: Sequence[str] | None = None,
+    evaluators: Sequence[str] | None = None,
+    *,
+    seeds: int = 1,
+) -> Suite:
+    """Return the suite that words and selections mean.
+
+    Parameters
+    ----------
+    words : sequence of str, optional
+        One suite (a TOML file or the name of one that comes with roofbench), or scene folders and presets; the suite
+        ``quick`` when empty.
+    detectors, evaluators : sequence of str, optional
+        Selections that replace those of the suite.
+    seeds : int
+        Seeds of stochastic detectors that are selected here.
+
+    Raises
+    ------
+    UnknownNameError
+        No such suite, scene, detector or evaluator; the nearest name is given.
+    """
+    words = words or ["quick"]
+    if len(words) == 1 and words[0].endswith(".toml"):
+        suite = read_suite(words[0])
+    elif len(words) == 1 and words[0] in suite_names():
+        suite = named_suite(words[0])
+    else:
+        suite = Suite("scenes", scenes_of(words), (), (make_evaluator(_DEFAULT_EVALUATOR),))
+        if not detectors:
+            suite = replace(suite, entrants=all_entrants())
+    if detectors:
+        numbers = tuple(range(seeds))
+        suite = replace(suite, entrants=tuple(Entrant(make_detector(name), numbers) for name in detectors))
+    if evaluators:
+        suite = replace(suite, evaluators=tuple(make_evaluator(name) for name in evaluators))
+    return suite
 
 
 def all_entrants() -> tuple[Entrant, ...]:
@@ -259,7 +301,7 @@ def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number
         raise places.error(
             f"no preset {preset!r}{hint}; there are {', '.join(preset_names())}", "scenes", number, "preset"
         )
-    seeds = _seeds(entry.get("seeds", [0]), first=1, places=places, table="scenes", number=number)
+    seeds = _seeds(entry.get("seeds", [1]), first=1, places=places, table="scenes", number=number)
     names = [key for key in entry if key not in ("preset", "seeds")]
     axes = [value if isinstance(value := entry[key], list) else [value] for key in names]
     for key, axis in zip(names, axes, strict=True):

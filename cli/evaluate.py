@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from .options import FORMAT_HELP, EvaluatorOption, GsdOption, JoinGapsOption, OverwriteOption, QuietOption
+
 if TYPE_CHECKING:
     import shapely
 
@@ -16,46 +18,65 @@ __all__ = ["evaluate"]
 
 
 def evaluate(
-    detected: Annotated[str, typer.Argument(help="Detected footprints; 'file.gpkg|layername=NAME' names a layer.")],
-    reference: Annotated[
-        str, typer.Argument(help="Reference footprints, or a scene folder (its reference, area and pixel grid).")
+    detected: Annotated[
+        str,
+        typer.Argument(metavar="DETECTED", help="Detected footprints; 'FILE.gpkg|layername=NAME' names a layer."),
     ],
-    evaluator: Annotated[
-        str, typer.Option("--evaluator", "-e", help="Evaluator, as name or name[parameter=value].")
-    ] = "threshold-free",
+    reference: Annotated[
+        str,
+        typer.Argument(
+            metavar="REFERENCE", help="Reference footprints, or a scene folder (its reference, area and pixel grid)."
+        ),
+    ],
+    evaluator: EvaluatorOption = "threshold-free",
     matching: Annotated[
-        Literal["nearest", "one-pass", "overlap"] | None, typer.Option(help="How partners are chosen [nearest].")
+        Literal["nearest", "one-pass", "overlap"] | None,
+        typer.Option("--matching", help="How detections and references are matched [nearest]."),
     ] = None,
     area: Annotated[
-        Literal["exact", "pixels"] | None, typer.Option(help="Areas by polygon overlay or by pixel centres [exact].")
+        Literal["exact", "pixels"] | None,
+        typer.Option("--area", help="Measure areas by polygon overlay or by pixel centres [exact]."),
     ] = None,
-    gsd: Annotated[
-        float | None, typer.Option(help="Pixel size in metres, for --area pixels and the RMSE in pixels.")
+    gsd: GsdOption = None,
+    minimum_area: Annotated[
+        float | None,
+        typer.Option("--minimum-area", metavar="M2", help="Leave out references smaller than this, in m2."),
     ] = None,
-    minimum_area: Annotated[float | None, typer.Option(help="Ignore references below this area, m2.")] = None,
     evaluation_area: Annotated[
-        str | None, typer.Option(help="Vector file with the polygon inside which the reference is complete.")
+        str | None,
+        typer.Option(
+            "--evaluation-area",
+            metavar="FILE",
+            help="Polygons inside which the reference is complete.",
+        ),
     ] = None,
     building_id: Annotated[
-        str | None, typer.Option(help="Reference column that joins the parts of one building.")
+        str | None,
+        typer.Option(
+            "--building-id", metavar="COLUMN", help="Reference column; footprints with the same value are one building."
+        ),
     ] = None,
-    join_gaps: Annotated[
-        float | None, typer.Option(help="Join reference polygons over gaps below this, m: houses of a row to blocks.")
-    ] = None,
+    join_gaps: JoinGapsOption = None,
     crs: Annotated[
-        str | None, typer.Option(help="CRS of the files that name none or a wrong one, such as EPSG:25832.")
+        str | None,
+        typer.Option(
+            "--crs", metavar="CRS", help="CRS to assign to files whose CRS is missing or wrong, such as EPSG:25832."
+        ),
     ] = None,
-    form: Annotated[
-        Literal["table", "json", "csv", "md"], typer.Option("--format", "-f", help="How the result is printed.")
-    ] = "table",
+    form: Annotated[Literal["table", "json", "csv", "md"], typer.Option("--format", "-f", help=FORMAT_HELP)] = "table",
     verdicts: Annotated[
-        Path | None, typer.Option(help="Write a verdict with its reason for every object (.gpkg: two layers).")
+        Path | None,
+        typer.Option(
+            "--verdicts", metavar="FILE", help="Vector file for the verdicts and their reasons (.gpkg: two layers)."
+        ),
     ] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw a map of the verdicts (.png, .svg, .pdf).")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace output files that exist.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing on standard error.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", metavar="FILE", help="Map of the verdicts (.png, .svg, .pdf).")
+    ] = None,
+    overwrite: OverwriteOption = False,
+    quiet: QuietOption = False,
 ) -> None:
-    """Compare detected with reference footprints: 15 indices, and why each object is right or wrong.
+    """Compare detected with reference footprints: 15 indices, and why each object counts as correct or wrong.
 
     Files may be GeoJSON, GeoPackage, Shapefile, FlatGeobuf or GeoParquet, in a projected CRS in metres.
     """
@@ -67,12 +88,10 @@ def evaluate(
 
     chosen: dict[str, Any] = {"matching": matching, "area": area, "gsd": gsd, "minimum_area": minimum_area}
     given = {name: str(value) for name, value in chosen.items() if value is not None}
-    judge = make_evaluator(evaluator, given)
+    scorer = make_evaluator(evaluator, given)
     _check_targets(verdicts, plot, inputs=(detected, reference, evaluation_area), overwrite=overwrite)
     if building_id is not None and join_gaps is not None:
-        raise InputError(
-            "blocks of joined footprints have no building ids: give --building-id or --join-gaps, not both"
-        )
+        raise InputError("blocks of joined footprints have no building ids: set building_id= or join_gaps=, not both")
     found = read_footprints(detected, crs=crs)
     scene = open_scene(reference) if Path(reference).is_dir() else None
     if scene is not None:
@@ -80,7 +99,7 @@ def evaluate(
             raise InputError(f"{reference}: the scene has no reference footprints: name a vector file")
         if building_id is not None:
             raise InputError(
-                f"{reference} is a scene with building ids of its own: leave out --building-id, or name a vector file"
+                f"{reference} is a scene with its own building ids: leave out building_id=, or name a vector file"
             )
         truth, boundary, grid = scene.reference, scene.area, scene.evaluation_grid
     else:
@@ -92,7 +111,7 @@ def evaluate(
             for repair in footprints.repairs[:10]:
                 typer.echo(f"{footprints.source}: {repair}", err=True)
             if len(footprints.repairs) > 10:
-                typer.echo(f"{footprints.source}: {len(footprints.repairs) - 10} more mended or left out", err=True)
+                typer.echo(f"{footprints.source}: {len(footprints.repairs) - 10} more repaired or left out", err=True)
             if not len(footprints):
                 typer.echo(f"{footprints.source}: no footprints", err=True)
         _warn_of_place(found, truth)
@@ -103,12 +122,12 @@ def evaluate(
         )
     if join_gaps is not None:
         truth = truth.joined(join_gaps)
-    result = judge.evaluate(found, truth, area=boundary, grid=grid)
+    result = scorer.evaluate(found, truth, area=boundary, grid=grid)
     title = f"{_short(detected)} against {_short(reference)}"
     if verdicts is not None or plot is not None:
         objects = result.verdicts
         if objects is None:
-            raise UnsupportedError(f"the evaluator {judge.name!r} gives no verdicts: leave out --verdicts and --plot")
+            raise UnsupportedError(f"the evaluator {scorer.name!r} gives no verdicts: leave out verdicts= and plot=")
         if verdicts is not None:
             from ..reports.verdict_layers import write_verdicts
 
@@ -133,9 +152,9 @@ def _warn_of_place(detected: Footprints, reference: Footprints) -> None:
         return
     low, high = np.max([box[:2] for box in boxes], axis=0), np.min([box[2:] for box in boxes], axis=0)
     if (low > high).any():
-        told = [f"x {box[0]:.0f} to {box[2]:.0f}, y {box[1]:.0f} to {box[3]:.0f}" for box in boxes]
+        ranges = [f"x {box[0]:.0f} to {box[2]:.0f}, y {box[1]:.0f} to {box[3]:.0f}" for box in boxes]
         typer.echo(
-            f"warning: {detected.source} lies in {told[0]} and {reference.source} in {told[1]}: no overlap at all, "
+            f"warning: {detected.source} lies in {ranges[0]} and {reference.source} in {ranges[1]}: no overlap at all, "
             "check the CRS and the order of the axes",
             err=True,
         )

@@ -1,4 +1,4 @@
-"""The command ``roofbench``: its commands, exit codes and how errors are told.
+"""The command ``roofbench``: its commands, exit codes and how errors are reported.
 
 Exit codes: 0 good; 1 regression; 2 usage or bad input; 3 some runs failed; 4 nothing measured or not comparable.
 Data goes to standard output, messages and progress to standard error. Modules of the commands import what they need
@@ -14,7 +14,19 @@ from typing import Annotated
 import typer
 
 from ..core.errors import RoofbenchError
-from . import detect, evaluate, gate, plot, report, run, runs, scenes, sweep
+from . import baseline, plot, scenes
+from .check_plugin import check_plugin
+from .command import Command
+from .detect import detect
+from .evaluate import evaluate
+from .export import export
+from .gate import gate
+from .ls import ls
+from .report import report
+from .run import run
+from .score import score
+from .sweep import sweep
+from .why import why
 
 __all__ = ["app", "main"]
 
@@ -28,21 +40,23 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     # Plain help: markup would swallow the brackets of name[parameter=value].
     rich_markup_mode=None,
+    # Inherited by every command.
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("evaluate")(evaluate.evaluate)
-app.command("run")(run.run)
-app.command("detect")(detect.detect)
-app.command("sweep")(sweep.sweep)
-app.add_typer(gate.baseline_app)
-app.command("gate")(gate.gate)
-app.command("report")(report.report)
+app.command("run", cls=Command)(run)
+app.command("evaluate", cls=Command)(evaluate)
+app.command("detect", cls=Command)(detect)
+app.command("sweep", cls=Command)(sweep)
+app.command("report", cls=Command)(report)
 app.add_typer(plot.app)
-app.command("score")(runs.score)
-app.command("ls")(runs.ls)
-app.command("why")(runs.why)
-app.command("export")(runs.export)
-app.command("check-plugin")(detect.check_plugin)
 app.add_typer(scenes.app)
+app.add_typer(baseline.app)
+app.command("gate", cls=Command)(gate)
+app.command("ls", cls=Command)(ls)
+app.command("why", cls=Command)(why)
+app.command("score", cls=Command)(score)
+app.command("export", cls=Command)(export)
+app.command("check-plugin", cls=Command)(check_plugin)
 
 
 def _version(asked: bool) -> None:
@@ -56,7 +70,7 @@ def _version(asked: bool) -> None:
 @app.callback()
 def _root(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     pass
@@ -71,18 +85,18 @@ def main() -> None:
             if sys.stdout is not None and not sys.stdout.closed:
                 sys.stdout.flush()
     except RoofbenchError as error:
-        _tell(str(error))
+        _print_error(str(error))
         sys.exit(2)
     except SystemExit as leaving:
         if leaving.code == _INTERRUPTED:
-            typer.echo("Stopped: no half-written file is left; 'roofbench run --resume' goes on with a run", err=True)
+            typer.echo("Stopped: no partial file is left; 'roofbench run --resume' continues a run", err=True)
         raise
     except BrokenPipeError:
         # The reader of a pipe (head, less) has gone: not an error.
         _close_stdout()
         sys.exit(0)
     except OSError as error:
-        _tell(f"{error.filename or 'the output'}: {error.strerror or error}")
+        _print_error(f"{error.filename or 'the output'}: {error.strerror or error}")
         _close_stdout()
         sys.exit(2)
     except Exception as error:
@@ -90,11 +104,11 @@ def main() -> None:
 
         if not isinstance(error, sqlite3.Error):
             raise
-        _tell(f"the results store cannot be written or read: {error}")
+        _print_error(f"the results store cannot be written or read: {error}")
         sys.exit(2)
 
 
-def _tell(sentence: str) -> None:
+def _print_error(sentence: str) -> None:
     typer.secho(f"Error: {sentence}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
 
 

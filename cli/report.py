@@ -3,70 +3,75 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from ..core.errors import ParameterError
-from .options import PluginOption, QuietOption, load_plugins, messages
+from .command import load_plugins
+from .console import messages
+from .options import DetectorsOption, IndexOption, OverwriteOption, PluginOption, QuietOption, ScenesOption
 
-if TYPE_CHECKING:
-    from ..reports.report_data import Report
-
-__all__ = ["report", "write_report"]
+__all__ = ["report"]
 
 
 def report(
-    words: Annotated[
-        list[str],
-        typer.Argument(metavar="STORE | compare A B", help="A results store; or 'compare' and two of them."),
-    ],
+    store: Annotated[Path, typer.Argument(metavar="STORE", help="Results store.")],
+    against: Annotated[
+        Path | None,
+        typer.Option("--against", metavar="STORE", help="Compare with this store: a table of paired differences."),
+    ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="HTML file (of compare: Markdown or CSV).")
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="HTML file [report.html]; with --against Markdown (.md) or .csv."
+        ),
     ] = None,
-    detector: Annotated[
-        str | None, typer.Option("--detector", "-d", help="Only matching labels.", metavar="PATTERN")
-    ] = None,
-    scene: Annotated[str | None, typer.Option("--scene", help="Only matching scenes.", metavar="PATTERN")] = None,
-    rank_by: Annotated[str | None, typer.Option(help="Index that ranks, for instance pixel.quality.")] = None,
-    title: Annotated[str | None, typer.Option(help="Title of the report.")] = None,
+    detectors: DetectorsOption = None,
+    scenes: ScenesOption = None,
+    index: IndexOption = None,
+    title: Annotated[str | None, typer.Option("--title", metavar="TEXT", help="Title of the report.")] = None,
     sweep: Annotated[
-        list[Path] | None, typer.Option(help="Table of 'roofbench sweep -o' to draw as well; repeat for more.")
+        list[Path] | None,
+        typer.Option("--sweep", metavar="FILE", help="Table of 'roofbench sweep -o' to draw as well; repeat for more."),
     ] = None,
-    gate: Annotated[Path | None, typer.Option(help="Result of 'roofbench gate --format json' to show.")] = None,
-    level: Annotated[float, typer.Option(min=0, max=1, help="Quality at which a detector breaks down.")] = 0.8,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")] = False,
+    gate: Annotated[
+        Path | None,
+        typer.Option("--gate", metavar="FILE", help="Output of 'roofbench gate --format json' to show as well."),
+    ] = None,
+    level: Annotated[
+        float, typer.Option("--level", min=0, max=1, metavar="Q", help="Quality below which a detector breaks down.")
+    ] = 0.8,
+    overwrite: OverwriteOption = False,
     plugin: PluginOption = None,
     quiet: QuietOption = False,
 ) -> None:
-    """Write everything that a results store holds into one HTML file, to look at offline or to mail.
+    """Write the contents of a results store as one HTML file, to view offline or to send by mail.
 
-    With 'compare A B': the detectors and scenes that two stores have in common, as a table of paired differences.
+    With --against, print the paired differences between two stores over the detectors and scenes they share.
     """
     from ..core.output import check_target
 
     load_plugins(plugin)
-    if words[0] == "compare" and len(words) == 3:
-        _compare(Path(words[1]), Path(words[2]), output, detector, scene, overwrite)
+    if against is not None:
+        _compare(store, against, output, detectors, scenes, overwrite)
         return
-    if len(words) != 1 or words[0] == "compare":
-        raise ParameterError("name one results store, or 'compare' and two of them: roofbench report compare A B")
-    if output is None:
-        output = Path("report.html")
+    output = output or Path("report.html")
     check_target(output, overwrite)
 
     from ..benchmark.analysis.report_contents import fill_report, newest_runs
     from ..benchmark.analysis.sensitivity import read_sweep_table
     from ..benchmark.store.writer import Store
     from ..reports.gate_json import read_gate
+    from ..reports.html_report import write_report
 
     tables = [line for path in sweep or () for line in read_sweep_table(path, level=level)]
-    with Store(words[0], must_exist=True) as opened:
+    with Store(store, must_exist=True) as opened:
         filled = fill_report(
             opened,
-            newest_runs(opened, detector=detector, scene=scene),
-            title=title or f"Results of {Path(words[0]).name}",
-            rank_by=rank_by,
+            newest_runs(opened, detector=detectors, scene=scenes),
+            title=title or f"Results of {store.name}",
+            rank_by=index,
             gate=None if gate is None else read_gate(gate),
             sensitivities=tables,
             level=level,
@@ -75,19 +80,8 @@ def report(
     messages(quiet).print(f"{output}: {size / 1e6:.1f} MB, {len(filled.scenes)} scenes drawn", markup=False)
 
 
-def write_report(filled: Report, path: Path, *, level: float = 0.8, overwrite: bool) -> int:
-    """Write a report, whole or not at all; return its size in bytes."""
-    from ..core.output import whole_file
-    from ..reports.html_report import html_report
-
-    content = html_report(filled, level=level).encode("utf-8", "xmlcharrefreplace")
-    with whole_file(path, overwrite=overwrite) as scratch:
-        scratch.write_bytes(content)
-    return len(content)
-
-
 def _compare(
-    one: Path, two: Path, output: Path | None, detector: str | None, scene: str | None, overwrite: bool
+    one: Path, two: Path, output: Path | None, detectors: str | None, scenes: str | None, overwrite: bool
 ) -> None:
     from ..benchmark.analysis.comparison import compare_stores
     from ..benchmark.store.writer import Store
@@ -102,7 +96,7 @@ def _compare(
         form = endings[output.suffix.lower()]
         check_target(output, overwrite)
     with Store(one, must_exist=True) as first, Store(two, must_exist=True) as second:
-        result = compare_stores(first, second, detector=detector, scene=scene)
+        result = compare_stores(first, second, detector=detectors, scene=scenes)
     typer.echo(format_comparison(result, "table"))
     if output is not None:
         with whole_file(output, overwrite=overwrite) as scratch:

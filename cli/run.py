@@ -10,49 +10,58 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ..core.errors import ParameterError
+from .command import RunOptions, with_run_options
+from .console import messages, table_console
 from .options import (
     DetectorOption,
     DetectorSeedsOption,
-    EvaluatorOption,
-    RunOptions,
+    EvaluatorsOption,
+    IndexOption,
+    OverwriteOption,
     ScenesOption,
     SeedsOption,
     WordsArgument,
-    messages,
-    suite_from_words,
-    table_console,
-    with_run_options,
 )
 from .progress import run_progress
 
 if TYPE_CHECKING:
     from ..benchmark.plan import Plan
-    from ..reports.tables import Leaderboard
+
+__all__ = ["run"]
 
 
 @with_run_options
 def run(
     words: WordsArgument = None,
     detector: DetectorOption = None,
-    evaluator: EvaluatorOption = None,
+    evaluator: EvaluatorsOption = None,
     scenes: ScenesOption = None,
     seeds: SeedsOption = None,
     detector_seeds: DetectorSeedsOption = 1,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder for report.html, leaderboard.csv and leaderboard.md.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FOLDER", help="Folder for report.html, leaderboard.csv and leaderboard.md."
+        ),
     ] = None,
-    rank_by: Annotated[str | None, typer.Option(help="Index that ranks, for instance pixel.quality.")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="List what would run and why the rest would not.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what this store was last asked for.")] = False,
+    overwrite: OverwriteOption = False,
+    index: IndexOption = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="List what would run, and why the rest would not, and stop.")
+    ] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the last run of this store.")] = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run only what failed before.")] = False,
-    overwrite: Annotated[
+    rerun: Annotated[
         Literal["missing", "never", "always"],
-        typer.Option(help="missing: all without a good result; never: not even failures again; always: everything."),
+        typer.Option(
+            "--rerun",
+            help="missing: what has no good result; never: only what is not stored at all; always: everything.",
+        ),
     ] = "missing",
     *,
     options: RunOptions,
 ) -> None:
-    """Run detectors on scenes and print the leaderboard; what the store holds already is not run again.
+    """Run detectors on scenes and print the leaderboard; stored results are reused.
 
     Exit code 3 when runs failed, 4 when nothing could be measured.
     """
@@ -61,44 +70,45 @@ def run(
     from ..benchmark.execution.runner import run_plan
     from ..benchmark.plan import make_plan, plan_content, suite_from_content
     from ..benchmark.store.writer import Store
-    from ..reports.tables import print_incidents
-    from .report import write_report
+    from ..benchmark.suite import suite_of_words
+    from ..reports.html_report import write_report
+    from ..reports.tables import print_incidents, write_leaderboards
 
     execution = options.execution()
     if resume and words:
-        raise ParameterError("--resume goes on with what the store was asked for: leave out the suite and scenes")
-    told = messages(options.quiet)
+        raise ParameterError("resume=True continues the last run of the store: leave out the suite and scenes")
+    console = messages(options.quiet)
     with Store(options.store, must_exist=resume) as opened:
         suite = (
             suite_from_content(opened.last_plan())
             if resume
-            else suite_from_words(words, detector, evaluator, seeds=detector_seeds)
+            else suite_of_words(words, detector, evaluator, seeds=detector_seeds)
         )
         if seeds is not None:
             suite = suite.with_seeds(seeds)
         if scenes is not None:
             suite = suite.with_scenes(scenes)
-        rank_index(suite.evaluators[0], rank_by)
+        rank_index(suite.evaluators[0], index)
         if output is not None and not dry_run:
-            _make_folder(output)
-        plan = make_plan(suite, opened, overwrite=overwrite, only_failed=retry_failed)
+            _make_folder(output, overwrite)
+        plan = make_plan(suite, opened, overwrite=rerun, only_failed=retry_failed)
         if dry_run:
             _print_plan(plan)
             return
         opened.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
-        with run_progress(plan, told) as report:
-            result = run_plan(plan, opened, execution=execution, overwrite=overwrite, progress=report)
+        with run_progress(plan, console, verbose=options.verbose) as report:
+            result = run_plan(plan, opened, execution=execution, overwrite=rerun, progress=report)
         boards = [
-            make_leaderboard(result.rows, opened, judge, title=f"Suite {suite.name}", rank_by=rank_by)
+            make_leaderboard(result.rows, opened, judge, title=f"Suite {suite.name}", rank_by=index)
             for judge in plan.judges
         ]
         known = len(result.rows) - result.done
-        told.print(
+        console.print(
             f"{result.done} runs done, {known} stored before, {len(result.failed)} failed; store {options.store}"
         )
         # Files before the table: who reads it may close the pipe (head).
         if output is not None:
-            _write(output, boards)
+            write_leaderboards(output, boards)
             if any(entry.scenes for board in boards for entry in board.entries):
                 judged = list(zip(plan.judges, boards, strict=True))
                 filled = fill_report(opened, result.rows, title=f"Suite {suite.name}", judged=judged)
@@ -107,7 +117,7 @@ def run(
             if number:
                 typer.echo()
             board.print(table_console())
-        print_incidents(incidents_of(result.rows), told)
+        print_incidents(incidents_of(result.rows), console)
         if result.failed:
             raise typer.Exit(3)
         if not any(entry.scenes for board in boards for entry in board.entries):
@@ -126,7 +136,7 @@ def _print_plan(plan: Plan) -> None:
     )
 
 
-def _make_folder(folder: Path) -> None:
+def _make_folder(folder: Path, overwrite: bool) -> None:
     """Make the folder for results before the long work, or say why it cannot be."""
     from ..core.errors import OutputError
     from ..core.output import check_target
@@ -135,16 +145,6 @@ def _make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = "it is a file" if folder.is_file() else error.strerror
-        raise OutputError(f"{folder} cannot be made: {reason}; name another folder with -o") from error
-    check_target(folder / "report.html", overwrite=True)
-
-
-def _write(folder: Path, boards: list[Leaderboard]) -> None:
-    """Write one CSV and one Markdown file; a further evaluator gets files of its own name."""
-    from ..core.output import whole_file
-
-    for number, board in enumerate(boards):
-        name = "leaderboard" if number == 0 else f"leaderboard-{board.evaluator.partition(' ')[0]}"
-        for ending, text in (("csv", board.to_csv()), ("md", board.to_markdown())):
-            with whole_file(folder / f"{name}.{ending}", overwrite=True) as scratch:
-                scratch.write_text(text, encoding="utf-8")
+        raise OutputError(f"{folder} cannot be made: {reason}; set another folder by output=") from error
+    for name in ("report.html", "leaderboard.csv", "leaderboard.md"):
+        check_target(folder / name, overwrite)

@@ -1,4 +1,4 @@
-"""``roofbench sweep``: quality along parameters and along what makes scenes hard."""
+"""``roofbench sweep``: quality along parameters of detectors and of synthetic scenes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import OutputError, ParameterError
+from . import completion
+from .command import RunOptions, with_run_options
+from .console import messages, table_console
 from .options import (
     DetectorSeedsOption,
-    EvaluatorOption,
-    RunOptions,
+    EvaluatorsOption,
+    IndexOption,
+    OverwriteOption,
+    ScenesOption,
     SeedsOption,
     WordsArgument,
-    messages,
-    suite_from_words,
-    table_console,
-    with_run_options,
 )
 from .progress import run_progress
 
@@ -27,35 +28,51 @@ if TYPE_CHECKING:
     from ..benchmark.analysis.sweep import Sweep
     from ..evaluators.base import Index
 
+__all__ = ["sweep", "write_table"]
+
 
 @with_run_options
 def sweep(
-    detectors: Annotated[str, typer.Argument(help="Detector, or several with commas between.", metavar="DETECTOR")],
+    detectors: Annotated[
+        str,
+        typer.Argument(
+            metavar="DETECTOR", help="Detector, or several separated by commas.", autocompletion=completion.detectors
+        ),
+    ],
     words: WordsArgument = None,
     vary: Annotated[
         list[str] | None,
-        typer.Option(help="NAME=VALUE,VALUE,... or NAME=FROM:TO:STEP; scene.NAME: of the generator; repeat for more."),
+        typer.Option(
+            "--vary",
+            metavar="NAME=VALUES",
+            help="VALUES: VALUE,VALUE,... or FROM:TO:STEP; scene.NAME varies the generator; repeat for more.",
+        ),
     ] = None,
-    grid: Annotated[bool, typer.Option("--grid", help="Vary all together, not one at a time.")] = False,
+    grid: Annotated[bool, typer.Option("--grid", help="Vary all axes together, not one at a time.")] = False,
+    scenes: ScenesOption = None,
     seeds: SeedsOption = None,
     detector_seeds: DetectorSeedsOption = 1,
-    index: Annotated[str | None, typer.Option(help="Index that is printed, for instance pixel.quality.")] = None,
+    index: IndexOption = None,
     level: Annotated[
-        float | None, typer.Option(help="Tell where the index passes this level, for instance 0.8 for 80 %.")
+        float | None,
+        typer.Option("--level", metavar="VALUE", help="Report where the index passes this value, such as 0.8."),
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Tidy table, .csv or .parquet.")] = None,
-    evaluator: EvaluatorOption = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an output file that exists.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Tidy table, .csv or .parquet.")
+    ] = None,
+    evaluator: EvaluatorsOption = None,
+    overwrite: OverwriteOption = False,
     *,
     options: RunOptions,
 ) -> None:
-    """Sweep detector parameters or axes of the generator; what the store holds already is not run again.
+    """Sweep detector parameters or parameters of the scene generator; stored results are reused.
 
     Exit code 3 when runs failed, 4 when nothing could be measured.
     """
     from ..benchmark.analysis.leaderboard import incidents_of, rank_index
     from ..benchmark.analysis.sweep import axis_of, break_downs, make_sweep, run_sweep
     from ..benchmark.store.writer import Store
+    from ..benchmark.suite import suite_of_words
     from ..core.output import check_target
     from ..core.registry import split_list
     from ..reports.tables import print_incidents
@@ -65,28 +82,30 @@ def sweep(
         if output.suffix.lower() not in (".csv", ".parquet"):
             raise OutputError(f"{output}: unknown file ending {output.suffix!r}: name it .csv or .parquet")
         check_target(output, overwrite)
-    suite = suite_from_words(words, split_list(detectors), evaluator, seeds=detector_seeds)
+    suite = suite_of_words(words, split_list(detectors), evaluator, seeds=detector_seeds)
     if seeds is not None:
         suite = suite.with_seeds(seeds)
+    if scenes is not None:
+        suite = suite.with_scenes(scenes)
     shown = rank_index(suite.evaluators[0], index)
     if level is not None and shown.better == "neither":
         raise ParameterError(f"{shown.key} has no better direction, so no level to break down at")
-    told = messages(options.quiet)
+    console = messages(options.quiet)
     with Store(options.store) as opened:
         planned = make_sweep(suite, [axis_of(text) for text in vary or ()], opened, grid=grid)
-        with run_progress(planned.plan, told) as report:
+        with run_progress(planned.plan, console, verbose=options.verbose) as report:
             table, rows = run_sweep(planned, opened, execution=execution, progress=report)
     # The file before the table: who reads that may close the pipe (head).
     if output is not None:
         write_table(table, output, overwrite=overwrite)
-        told.print(f"{output}: {len(table)} rows", markup=False)
+        console.print(f"{output}: {len(table)} rows", markup=False)
     _print(table, planned, shown)
     if level is not None:
         first = table[table["evaluator"] == planned.plan.judges[0].label]
         for found in break_downs(first, planned.axes, shown, level):
             typer.echo(str(found))
     incidents = incidents_of(rows)
-    print_incidents(incidents, told)
+    print_incidents(incidents, console)
     if any(incident.status == "failed" for incident in incidents):
         raise typer.Exit(3)
     if not table["scenes"].any():
@@ -114,12 +133,12 @@ def _print(table: pd.DataFrame, planned: Sweep, index: Index) -> None:
 
     from ..reports.tables import column_title, format_cell
 
-    mine = table[table["index"] == index.key]
+    chosen = table[table["index"] == index.key]
     names = [axis.name for axis in planned.axes]
     drawn = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for name in ("detector", *names, column_title(index), "95 %", "scenes", "failed", "skipped"):
         drawn.add_column(Text(name), justify="left" if name == "detector" else "right", no_wrap=True)
-    for row in mine.to_dict("records"):
+    for row in chosen.to_dict("records"):
         values = [_axis_value(row[name]) for name in names]
         bounds = [format_cell(row[bound], index.unit) for bound in ("low", "high") if row[bound] == row[bound]]
         mean = format_cell(row["mean"] if row["mean"] == row["mean"] else None, index.unit)

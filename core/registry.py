@@ -22,7 +22,7 @@ from typing import Any
 from .errors import InputError, ParameterError, UnknownNameError
 from .package import NAME
 
-__all__ = ["Registry", "nearest_hint", "parse_selection", "split_list"]
+__all__ = ["Registry", "nearest_hint", "parse_assignment", "parse_selection", "split_list"]
 
 _SELECTION = re.compile(r"^(?P<name>[^\[\]]+?)(?:\[(?P<parameters>.*)\])?$", re.DOTALL)
 
@@ -31,6 +31,18 @@ def nearest_hint(name: str, known: Iterable[str]) -> str:
     """Return ``" (did you mean 'x'?)"`` for the nearest known name, or an empty text."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
     return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+def parse_assignment(text: str) -> tuple[str, str]:
+    """Read ``name=value``; everything after the first ``=`` belongs to the value.
+
+    >>> parse_assignment("height = 2.5")
+    ('height', '2.5')
+    """
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip():
+        raise ParameterError(f"cannot read {text!r}: write NAME=VALUE")
+    return name.strip(), value.strip()
 
 
 def parse_selection(text: str) -> tuple[str, dict[str, str]]:
@@ -45,10 +57,11 @@ def parse_selection(text: str) -> tuple[str, dict[str, str]]:
     values: dict[str, str] = {}
     for item in (match["parameters"] or "").split(","):
         if item.strip():
-            key, equals, value = item.partition("=")
-            if not equals:
-                raise ParameterError(f"cannot read {item.strip()!r} in {text!r}: write parameter=value")
-            values[key.strip()] = value.strip()
+            try:
+                key, value = parse_assignment(item)
+            except ParameterError:
+                raise ParameterError(f"cannot read {item.strip()!r} in {text!r}: write parameter=value") from None
+            values[key] = value
     return match["name"].strip(), values
 
 

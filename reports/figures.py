@@ -6,11 +6,12 @@ import os
 from pathlib import Path
 
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from ..core.errors import OutputError
 from ..core.output import whole_file
 
-__all__ = ["check_picture", "save_figure"]
+__all__ = ["check_picture", "save_figure", "save_plot"]
 
 _ENDINGS = (".png", ".svg", ".pdf")
 
@@ -46,3 +47,15 @@ def save_figure(
         figure.savefig(
             scratch, metadata=metadata, dpi="figure" if dpi is None else dpi, bbox_inches="tight" if tight else None
         )
+
+
+def save_plot(
+    figure: Figure, path: str | os.PathLike[str], *, dpi: float | None = None, overwrite: bool = False
+) -> None:
+    """Write a figure on a white background; a ``$`` in a label is printed and starts no formula."""
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        text.set_parse_math(False)
+    figure.set_facecolor("white")
+    figure.patch.set_alpha(1)
+    save_figure(figure, path, dpi=dpi, overwrite=overwrite)

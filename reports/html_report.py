@@ -13,11 +13,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import jinja2
 from markupsafe import Markup, escape
 
+from ..core.output import whole_file
 from ..core.package import VERSION
 from ..evaluators.base import Index
 from .charts import cost_figure, size_figure
@@ -28,7 +30,7 @@ from .report_data import Report
 from .sensitivity import sensitivity_figure
 from .tables import Cell, Entry, Leaderboard, format_cell
 
-__all__ = ["html_report"]
+__all__ = ["html_report", "write_report"]
 
 _MOST_MATRIX_ROWS = 300
 #: Panels in one sensitivity figure.
@@ -341,3 +343,11 @@ def _charts(report: Report, level: float) -> dict[str, Any]:
 
 def _svg(figure: Any, name: str, description: str) -> Markup:
     return Markup(to_inline_svg(figure, name=name, description=description))  # noqa: S704 - escaped by matplotlib
+
+
+def write_report(filled: Report, path: Path, *, level: float = 0.8, overwrite: bool) -> int:
+    """Write a report, whole or not at all; return its size in bytes."""
+    content = html_report(filled, level=level).encode("utf-8", "xmlcharrefreplace")
+    with whole_file(path, overwrite=overwrite) as scratch:
+        scratch.write_bytes(content)
+    return len(content)

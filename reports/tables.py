@@ -11,8 +11,10 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ..core.output import whole_file
 from ..evaluators.base import Index
 
 if TYPE_CHECKING:
@@ -20,7 +22,16 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["Cell", "Entry", "Incident", "Leaderboard", "column_title", "format_cell"]
+__all__ = [
+    "Cell",
+    "Entry",
+    "Incident",
+    "Leaderboard",
+    "column_title",
+    "format_cell",
+    "print_incidents",
+    "write_leaderboards",
+]
 
 _DECIMALS = {"fraction": 1, "ratio": 3, "m": 2, "px": 1, "count": 0}
 _UNITS = {"fraction": "%", "ratio": "", "m": "m", "px": "px", "count": ""}
@@ -312,3 +323,12 @@ def print_incidents(incidents: Sequence[Incident], console: Console) -> None:
             ),
             soft_wrap=True,
         )
+
+
+def write_leaderboards(folder: Path, boards: Sequence[Leaderboard]) -> None:
+    """Write one CSV and one Markdown file; a further evaluator gets files with its own name."""
+    for number, board in enumerate(boards):
+        name = "leaderboard" if number == 0 else f"leaderboard-{board.evaluator.partition(' ')[0]}"
+        for ending, text in (("csv", board.to_csv()), ("md", board.to_markdown())):
+            with whole_file(folder / f"{name}.{ending}", overwrite=True) as scratch:
+                scratch.write_text(text, encoding="utf-8")

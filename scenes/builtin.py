@@ -19,11 +19,11 @@ from .geodata.points import PointCloud
 from .geodata.raster import Elevation, Grid, Image
 from .scene import Scene
 
-__all__ = ["hamlet"]
+__all__ = ["DENSITY", "GSD", "SIZE", "hamlet"]
 
-_SIZE = 120.0  # side of the square extent, m
-_GSD = 0.25  # of the orthoimage, m
-_DENSITY = 2.0  # laser pulses per m2
+SIZE = 120.0  # side of the square extent, m
+GSD = 0.25  # of the orthoimage, m
+DENSITY = 2.0  # laser pulses per m2
 _EAST, _NORTH = 500_000.0, 5_400_000.0  # lower left corner, m
 _ROOF_COLOURS = np.array([[150, 74, 58], [120, 62, 52], [112, 110, 112], [84, 86, 92], [176, 170, 160]])
 
@@ -81,7 +81,7 @@ def hamlet(seed: int = 0) -> Scene:
     )
     return Scene(
         f"hamlet-{seed}",
-        (_EAST, _NORTH, _EAST + _SIZE, _NORTH + _SIZE),
+        (_EAST, _NORTH, _EAST + SIZE, _NORTH + SIZE),
         crs="EPSG:25832",
         points=_points(houses, trees, rng),
         image=_image(houses, trees, rng),
@@ -99,7 +99,7 @@ def _ground(x: Array, y: Array) -> Array:
 def _houses(rng: np.random.Generator) -> list[_House]:
     """Place houses on a 5 x 5 grid of parcels, each turned and shifted by chance; a few parcels stay empty."""
     houses: list[_House] = []
-    pitch = _SIZE / 5
+    pitch = SIZE / 5
     for parcel in range(25):
         if rng.random() < 0.08:
             continue
@@ -125,13 +125,13 @@ def _houses(rng: np.random.Generator) -> list[_House]:
 
 def _is_inside(house: _House) -> bool:
     from_corner = house.corners() - np.array([_EAST, _NORTH])
-    return bool((from_corner > 0).all() and (from_corner < _SIZE).all())
+    return bool((from_corner > 0).all() and (from_corner < SIZE).all())
 
 
 def _trees(rng: np.random.Generator) -> Array:
     """Return trees as rows of x, y, crown radius, height."""
     count = 32
-    place = rng.uniform(0, _SIZE, (count, 2)) + np.array([_EAST, _NORTH])
+    place = rng.uniform(0, SIZE, (count, 2)) + np.array([_EAST, _NORTH])
     return np.column_stack([place, rng.uniform(1.2, 3.2, count), rng.uniform(3.0, 9.0, count)])
 
 
@@ -156,9 +156,9 @@ def _near(x: Array, y: Array, centre_x: float, centre_y: float, reach: float) ->
 
 
 def _points(houses: list[_House], trees: Array, rng: np.random.Generator) -> PointCloud:
-    count = int(_DENSITY * _SIZE**2)
-    x = _EAST + rng.uniform(0, _SIZE, count)
-    y = _NORTH + rng.uniform(0, _SIZE, count)
+    count = int(DENSITY * SIZE**2)
+    x = _EAST + rng.uniform(0, SIZE, count)
+    y = _NORTH + rng.uniform(0, SIZE, count)
     ground = _ground(x, y)
     roof, crown, _ = _surfaces(houses, trees, x, y)
     over = crown > roof
@@ -179,7 +179,7 @@ def _points(houses: list[_House], trees: Array, rng: np.random.Generator) -> Poi
 
 
 def _image(houses: list[_House], trees: Array, rng: np.random.Generator) -> Image:
-    grid = Grid.covering((_EAST, _NORTH, _EAST + _SIZE, _NORTH + _SIZE), _GSD)
+    grid = Grid.covering((_EAST, _NORTH, _EAST + SIZE, _NORTH + SIZE), GSD)
     x, y = grid.to_world(*np.meshgrid(np.arange(grid.rows) + 0.5, np.arange(grid.columns) + 0.5, indexing="ij"))
     roof, crown, which = _surfaces(houses, trees, x, y)
     patch = np.sin((x - _EAST) / 9) * np.sin((y - _NORTH) / 13)
@@ -196,6 +196,6 @@ def _image(houses: list[_House], trees: Array, rng: np.random.Generator) -> Imag
 
 
 def _dem(rng: np.random.Generator) -> Elevation:
-    grid = Grid.covering((_EAST, _NORTH, _EAST + _SIZE, _NORTH + _SIZE), 1.0)
+    grid = Grid.covering((_EAST, _NORTH, _EAST + SIZE, _NORTH + SIZE), 1.0)
     x, y = grid.to_world(*np.meshgrid(np.arange(grid.rows) + 0.5, np.arange(grid.columns) + 0.5, indexing="ij"))
     return Elevation((_ground(x, y) + rng.normal(0, 0.03, x.shape)).astype(np.float32), grid)

@@ -53,7 +53,9 @@ def check_scene(path: str | os.PathLike[str]) -> SceneReport:
     folder, manifest = read_manifest(path)
     scene = open_scene(path)
     problems = [
-        f"{name} changed since the manifest was written: if that is meant, add --seal" for name in changed_files(path)
+        f"{name} changed since the manifest was written: if that is intended, run "
+        "'roofbench scenes check --update-checksums'"
+        for name in changed_files(path)
     ]
     facts: dict[str, dict[str, Any]] = {"scene": _scene_facts(scene)}
     for kind in scene.holdings:

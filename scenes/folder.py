@@ -303,8 +303,8 @@ def _content_hash(folder: Path, manifest: Mapping[str, Any]) -> str:
     changed = changed_files(folder)
     if changed:
         raise InputError(
-            f"{folder}: {', '.join(changed)} changed since {MANIFEST} was written: if that is meant, take it in with "
-            "roofbench scenes check --seal"
+            f"{folder}: {', '.join(changed)} changed since {MANIFEST} was written: if that is intended, run "
+            "'roofbench scenes check --update-checksums'"
         )
     digest = hashlib.sha256(repr((manifest["extent"], manifest.get("crs"))).encode())
     for kind in FILES:

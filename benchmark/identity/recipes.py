@@ -27,7 +27,7 @@ from ...scenes.synthetic.presets import preset
 from ...scenes.synthetic.presets import preset_names as generator_presets
 from .keys import digest, module_closure, source_closure
 
-__all__ = ["PluginRecipe", "SceneRecipe", "label_of"]
+__all__ = ["PluginRecipe", "SceneRecipe", "code_digest", "label_of", "preset_names"]
 
 _HAMLET = "hamlet"
 _GENERATOR = "scenes.synthetic"

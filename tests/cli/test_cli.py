@@ -17,7 +17,7 @@ def cli(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def call(*words, code=0):
-        result = CliRunner().invoke(app, [str(word) for word in words])
+        result = CliRunner().invoke(app, [str(word) for word in words], prog_name="roofbench")
         if isinstance(result.exception, rb.RoofbenchError):
             assert code == 2, result.exception
             return str(result.exception)
@@ -42,7 +42,7 @@ def test_run_prints_a_leaderboard_and_writes_files(cli, misbehaving, tmp_path):
 
 def test_a_failing_detector_is_exit_code_3_with_reason_and_command(cli, misbehaving):
     result = cli("run", "hamlet", "-d", f"{misbehaving}[mode=leaves]", "-d", misbehaving, code=3)
-    assert "failed misbehaving[mode=leaves] on hamlet-0, seed 0: the worker process left" in result.stderr
+    assert "failed misbehaving[mode=leaves] on hamlet-1, seed 0: the worker process left" in result.stderr
     assert "repeat: roofbench detect" in result.stderr
     assert "misbehaving" in result.stdout
 
@@ -116,11 +116,10 @@ def test_detect_writes_what_a_run_stores(cli, misbehaving):
     ("words", "message"),
     [
         (("run", "nosuch.toml"), "nosuch.toml: no such suite file"),
-        (("run", "nosuch"), "is no scene folder and no preset"),
+        (("run", "nosuch"), "is no scene folder, preset or suite"),
         (("run", "hamlet", "-d", "ndms"), "did you mean 'ndsm'"),
-        (("run", "hamlet", "--memory-limit", "much"), "--memory-limit must be a size"),
         (("run", "hamlet", "-j", 0, "--time-limit", 3), "limits need a worker process"),
-        (("run", "hamlet", "--rank-by", "quality"), "has no index 'quality'"),
+        (("run", "hamlet", "--index", "quality"), "has no index 'quality'"),
         (("run", "hamlet", "--store", "no/where.sqlite"), "there is no folder no"),
         (("run", "hamlet", "--scenes", "x*"), "no scene of 'scenes' matches 'x*'"),
         (("run", "hamlet", "--plugin", "absent.py"), "absent.py: no such file"),
@@ -136,6 +135,19 @@ def test_a_wrong_word_is_one_sentence_and_exit_code_2(cli, words, message, tmp_p
     told = cli(*words, code=2)
     assert message in told
     assert "\n" not in told
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("run", "hamlet", "--memory-limit", "much"), "Invalid value for '--memory-limit': 'much' is not a size"),
+        (("scenes", "make", "hamlet", "-o", "x", "-p", "slope"), "'slope': write NAME=VALUE"),
+        (("plot", "scene", "x", "-o", "x.png", "--window", "1,2"), "write X,Y,WIDTH,HEIGHT"),
+        (("run", "--rerun", "sometimes"), "'sometimes' is not one of"),
+    ],
+)
+def test_a_value_that_cannot_be_read_is_refused_by_the_name_of_its_option(cli, words, message):
+    assert message in cli(*words, code=2).stderr
 
 
 def test_check_plugin_accepts_an_honest_detector_and_names_broken_rules(cli, misbehaving, tmp_path):
@@ -232,7 +244,7 @@ def test_detect_tells_an_error_of_the_detector_after_its_traceback(cli, bad_plug
     result = cli("detect", f"{bad_plugins}:{name}", "hamlet", "-o", "out.gpkg", code=3)
     assert result.stdout == ""
     *before, last = result.stderr.strip().splitlines()
-    assert last.startswith(f"Error: {name.lower()} failed on hamlet-0: ")
+    assert last.startswith(f"Error: {name.lower()} failed on hamlet-1: ")
     assert problem in last
     assert any(line.startswith("Traceback") for line in before)
     assert not (tmp_path / "out.gpkg").exists()

@@ -108,7 +108,7 @@ def test_no_repair_goes_unmentioned(files):
     write_layers({"d": (np.array([*MOVED, *[flat] * 14], dtype=object), {})}, files / "flat.gpkg", crs="EPSG:25832")
     run = roofbench("evaluate", "flat.gpkg", "r.gpkg", "-f", "csv", folder=files)
     assert run.stderr.count("left out") == 11
-    assert "flat.gpkg: 4 more mended or left out" in run.stderr
+    assert "flat.gpkg: 4 more repaired or left out" in run.stderr
 
 
 def test_verdicts_in_a_format_of_one_layer_tell_the_side(files):

@@ -31,7 +31,7 @@ def test_make_writes_a_folder_that_opens_as_the_same_scene(tmp_path):
 @pytest.mark.parametrize("setting", ["tree_density", "tree_density=many", "tree_densty=3"])
 def test_a_setting_that_cannot_be_read_is_refused(tmp_path, setting):
     made = run("scenes", "make", "fairfield-small", "-p", setting, "-o", str(tmp_path / "scene"))
-    assert isinstance(made.exception, ParameterError)
+    assert isinstance(made.exception, ParameterError) or made.exit_code == 2
     assert not (tmp_path / "scene").exists()
 
 

@@ -80,8 +80,8 @@ def main():
             "-n 0 -f json",
             "-n 0 --status failed",
             "-n 0 -d ndsm[[]height=7?]",
-            "-n 0 --scene hamlet-1?",
-            "--status failed --scene hamlet-1*",
+            "-n 0 --scenes hamlet-1?",
+            "--status failed --scenes hamlet-1*",
         ):
             command = [sys.executable, "-m", "roofbench", "ls", "--store", str(path), *words.split()]
             print(f"roofbench ls {words:36} {process_median(command)}, whole process")

@@ -63,8 +63,11 @@ def test_an_edited_file_is_told_until_it_is_sealed(saved, check):
     write_points(small_scenes.cloud(50), saved / "points.laz", crs=small_scenes.CRS)
     code, _, err = check()
     assert code == 2
-    assert "points.laz changed since the manifest was written: if that is meant, add --seal" in err
-    code, _, err = check("--seal")
+    assert (
+        "points.laz changed since the manifest was written: if that is intended, run 'roofbench scenes check --update-checksums"
+        in err
+    )
+    code, _, err = check("--update-checksums")
     assert (code, err) == (0, "- points.laz differed and was taken into the manifest\n")
     assert check()[0] == 0
 
@@ -110,7 +113,7 @@ def _broken_points(saved):
 )
 def test_what_does_not_fit_is_told(saved, check, spoil, problem):
     spoil(saved)
-    code, _, err = check("--seal")
+    code, _, err = check("--update-checksums")
     assert code == 2
     assert problem in err
 

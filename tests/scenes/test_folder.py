@@ -104,7 +104,7 @@ def test_a_file_edited_later_is_noticed_and_can_be_sealed(saved, tmp_path):
     rb.write_footprints(
         rb.Footprints.of([shapely.box(0, 0, 1, 1)], crs=small_scenes.CRS), edited / "reference.gpkg", overwrite=True
     )
-    with pytest.raises(InputError, match=r"reference\.gpkg changed since .*--seal"):
+    with pytest.raises(InputError, match=r"reference\.gpkg changed since .*--update-checksums"):
         _ = rb.open_scene(edited).content_hash
     assert folder.seal_scene(edited) == ["reference.gpkg"]
     assert folder.changed_files(edited) == []

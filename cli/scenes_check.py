@@ -1,0 +1,38 @@
+"""``roofbench scenes check``: the contents of a scene folder, and whether it is sound."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from .options import FORMAT_HELP
+
+__all__ = ["check"]
+
+
+def check(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene folder.")],
+    form: Annotated[Literal["table", "json"], typer.Option("--format", "-f", help=FORMAT_HELP)] = "table",
+    update: Annotated[
+        bool, typer.Option("--update-checksums", help="Accept edited files: write their checksums into the manifest.")
+    ] = False,
+) -> None:
+    """Check a scene folder and print its contents; exit code 2 when there is a problem."""
+    from ..reports.scene_text import format_facts
+    from ..scenes.checking import check_scene
+    from ..scenes.folder import seal_scene
+
+    for name in seal_scene(scene) if update else ():
+        typer.echo(f"- {name} was edited; its new checksum is in the manifest", err=True)
+    report = check_scene(scene)
+    if form == "json":
+        typer.echo(json.dumps({"facts": report.facts, "problems": report.problems}, indent=2))
+    else:
+        typer.echo(format_facts(report.facts), nl=False)
+    for problem in report.problems:
+        typer.echo(f"Error: {problem}", err=True)
+    if report.problems:
+        raise typer.Exit(2)

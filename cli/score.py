@@ -1,0 +1,55 @@
+"""``roofbench score``: evaluate stored detections again."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from . import completion
+from .command import load_plugins
+from .console import table_console
+from .options import DEFAULT_STORE, DetectorsOption, IndexOption, PluginOption, ScenesOption, StoreOption
+
+__all__ = ["score"]
+
+
+def score(
+    evaluator: Annotated[
+        list[str],
+        typer.Option(
+            "--evaluator",
+            "-e",
+            metavar="EVALUATOR",
+            help="NAME or 'NAME[parameter=value,...]'; repeat for more.",
+            autocompletion=completion.evaluators,
+        ),
+    ],
+    detectors: DetectorsOption = None,
+    scenes: ScenesOption = None,
+    index: IndexOption = None,
+    store: StoreOption = DEFAULT_STORE,
+    plugin: PluginOption = None,
+) -> None:
+    """Evaluate stored detections with other evaluators and print their leaderboards; no detector runs again."""
+    from ..benchmark.analysis.leaderboard import make_leaderboard
+    from ..benchmark.execution.runner import score_stored
+    from ..benchmark.plan import Judge
+    from ..benchmark.store.writer import Store
+    from ..evaluators.registry import make_evaluator
+
+    load_plugins(plugin)
+    judges = tuple(Judge.of(make_evaluator(name)) for name in evaluator)
+    with Store(store, must_exist=True) as opened:
+        rows = opened.runs(detector=detectors, scene=scenes)[::-1]
+        good = [row.id for row in rows if row.status == "ok"]
+        for judge in judges:
+            known = opened.evaluated(good, judge.key)
+            for run_id in good:
+                if run_id not in known:
+                    score_stored(opened, run_id, (judge,))
+        for judge in judges:
+            board = make_leaderboard(rows, opened, judge, title=f"Stored runs of {store}", rank_by=index)
+            board.print(table_console())
+    if not good:
+        raise typer.Exit(4)
