@@ -24,7 +24,7 @@ from .execution.tasks import Outcome, Task
 from .execution.worker import detect
 from .identity.recipes import PluginRecipe, SceneRecipe
 
-__all__ = ["Check", "check_detector", "check_evaluator"]
+__all__ = ["Check", "check_detector", "check_evaluator", "check_plugin"]
 
 _SECONDS = 300.0
 _ELSEWHERE = "works in another process, with the same result"

@@ -17,7 +17,17 @@ from .store.records import RunIdentity, RunRow, evaluation_key
 from .store.writer import Store
 from .suite import Entrant, Suite
 
-__all__ = ["Judge", "Overwrite", "Plan", "PlannedRun", "make_plan", "plan_content", "suite_from_content"]
+__all__ = [
+    "Judge",
+    "Overwrite",
+    "Plan",
+    "PlannedRun",
+    "differences",
+    "identity_now",
+    "make_plan",
+    "plan_content",
+    "suite_from_content",
+]
 
 #: ``missing``: what has no good result is run, failures again; ``never``: what is not stored at all; ``always``: all.
 Overwrite = Literal["missing", "never", "always"]

@@ -90,7 +90,7 @@ def test_the_group_of_a_scene_is_its_preset_even_where_that_has_a_number():
 def test_words_name_scenes():
     (scene,) = scenes_of(["hamlet[seed=3]"])
     assert (scene.name, scene.seed, scene.word) == ("hamlet-3", 3, "hamlet[seed=3]")
-    with pytest.raises(RoofbenchError, match=r"'hamet' is no scene folder and no preset \(did you mean 'hamlet'"):
+    with pytest.raises(RoofbenchError, match=r"'hamet' is no scene folder, preset or suite \(did you mean 'hamlet'"):
         scenes_of(["hamet"])
 
 

@@ -73,8 +73,8 @@ def test_ls_filters_and_tells_reasons(cli, misbehaving):
     assert "ZeroDivisionError: no houses at all" in cli("ls").stdout
     (row,) = json.loads(cli("ls", "--status", "ok", "-f", "json").stdout)
     assert (row["label"], row["detected"]) == ("misbehaving", 25)
-    assert cli("ls", "-d", "misbehaving", "-f", "csv").stdout.count("\n") == 2
-    assert "0 of 2 runs" in cli("ls", "--scene", "knox*").stdout
+    assert cli("ls", "--detectors", "misbehaving", "-f", "csv").stdout.count("\n") == 2
+    assert "0 of 2 runs" in cli("ls", "--scenes", "knox*").stdout
 
 
 def test_why_says_what_a_run_depends_on(cli, misbehaving):
@@ -96,7 +96,7 @@ def test_export_writes_verdict_layers(cli, misbehaving, tmp_path):
     cli("run", "hamlet", "-d", misbehaving, "-d", f"{misbehaving}[mode=raises]", "-j", 0, code=3)
     cli("export", 1, "-o", "run.gpkg")
     layer = rb.read_footprints("run.gpkg|layername=references")
-    assert len(layer) == len(hamlet(0).reference)
+    assert len(layer) == len(hamlet(1).reference)
     assert {"verdict", "reason"} <= set(layer.attributes)
     assert "has no footprints to export" in cli("export", 2, "-o", "other.gpkg", code=2)
     assert "exists already" in cli("export", 1, "-o", "run.gpkg", code=2)

@@ -99,7 +99,7 @@ def test_run_writes_the_report_beside_its_leaderboard(folder):
 
 
 def test_a_store_compared_with_itself_is_the_same(folder):
-    answer = roofbench("report", "compare", "runs.sqlite", "runs.sqlite", "-o", "same.md", folder=folder)
+    answer = roofbench("report", "runs.sqlite", "--against", "runs.sqlite", "-o", "same.md", folder=folder)
     lines = [line for line in answer.stdout.splitlines() if line.startswith("ndsm")]
     assert len(lines) == 3 * 15
     assert all(line.endswith("same") for line in lines)
@@ -108,7 +108,7 @@ def test_a_store_compared_with_itself_is_the_same(folder):
 
 def test_stores_without_common_scenes_are_not_comparable(folder):
     rb.run(scenes=["hamlet[seed=3]"], detectors=["ndsm"], store=folder / "other.sqlite")
-    answer = roofbench("report", "compare", "runs.sqlite", "other.sqlite", folder=folder, expect=4)
+    answer = roofbench("report", "runs.sqlite", "--against", "other.sqlite", folder=folder, expect=4)
     assert "only in B: 1 pairs" in answer.stdout
 
 
@@ -123,7 +123,6 @@ def test_plots_are_written(folder):
     ("arguments", "told"),
     [
         (("report", "nothing.sqlite", "-o", "x.html"), "no such results store"),
-        (("report", "compare", "runs.sqlite"), "name one results store"),
         (("plot", "scene", "castle", "-o", "x.png", "--store", "runs.sqlite"), "no run on 'castle'"),
         (("plot", "scene", "hamlet-*", "-o", "x.png", "--store", "runs.sqlite"), "several scenes match"),
         (("plot", "sweep", "missing.csv", "-o", "x.png"), "no such sweep table"),
