@@ -20,9 +20,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...scenes.geodata.outlines import coverage_of_mask, trace
 from ...scenes.geodata.raster import Grid
 from ..shared.morphology import closed, opened, without_holes
-from ..shared.outlines import coverage_of_mask, trace
 from ..shared.regularise import regularise
 from .cells import HIGH, LOW
 from .rectangles import inside_any

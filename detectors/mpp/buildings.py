@@ -20,8 +20,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...scenes.geodata.outlines import trace
 from ...scenes.geodata.raster import Grid
-from ..shared.outlines import trace
 from .rectangles import corners, to_world
 
 __all__ = ["outline_buildings"]

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ...core.parameters import parameter
 from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.outlines import coverage_of_mask, minimum_rectangles, trace
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.ground.heights import heights_of
@@ -32,7 +33,6 @@ from ...scenes.scene import Scene
 from ..base import Detector
 from ..shared.cues import CellCues, cell_cues, greenness
 from ..shared.morphology import opened, without_holes
-from ..shared.outlines import coverage_of_mask, minimum_rectangles, trace
 from ..shared.regularise import regularise
 from ..steps import Step
 from .ndsm_steps import ndsm_steps

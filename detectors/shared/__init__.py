@@ -1,1 +1,1 @@
-"""What several detectors use: cues, morphology, outlines, regularisation."""
+"""What several detectors use: cues, morphology, regularised walls."""

@@ -20,7 +20,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from .outlines import simplify
+from ...scenes.geodata.outlines import simplify
 
 __all__ = ["regularise"]
 

@@ -9,7 +9,7 @@ from roofbench.detectors.mpp.blocks import outline_blocks
 from roofbench.detectors.mpp.cells import HIGH, LOW
 from roofbench.detectors.mpp.rectangles import corners, inside_any
 from roofbench.detectors.shared import morphology
-from roofbench.detectors.shared.outlines import coverage_of_mask, trace
+from roofbench.scenes.geodata.outlines import coverage_of_mask, trace
 from roofbench.scenes.geodata.raster import Grid
 
 GRID = Grid.covering((0.0, 0.0, 60.0, 40.0), 0.5)

@@ -1,10 +1,10 @@
-"""Outlines: from a mask on a grid to polygons.
+"""Outlines: from a mask on a grid to polygons, for detections and for references alike.
 
 Nouns
 -----
 coverage
-    Share of each cell that belongs to an object, 0..1, shape (rows, columns). Where it crosses one half between two
-    cell centres lies the outline, so that it is found to a fraction of a cell.
+    Share of each cell that belongs to an object, 0..1, shape (rows, columns). The outline is where the share,
+    interpolated between cell centres, is one half: it is located to a fraction of a cell.
 
 Coordinates are metres, x east and y north.
 """
@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...scenes.geodata.raster import Grid
+from .raster import Grid
 
 __all__ = ["coverage_of_mask", "minimum_rectangles", "simplify", "trace"]
 
@@ -30,7 +30,7 @@ def coverage_of_mask(mask: NDArray[np.bool_], share: NDArray[np.float32] | None 
     ----------
     mask : ndarray of bool, shape (rows, columns)
     share : ndarray of float32, shape (rows, columns), optional
-        Measured share of each cell that is covered; it moves the outline between the centres. NaN is not known.
+        Measured share of each cell that is covered; it places the outline between the centres. NaN is unknown.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def trace(coverage: NDArray[np.float32], grid: Grid) -> NDArray[np.object_]:
     import contourpy
 
     x, y = grid.to_world(np.arange(-1, grid.rows + 1) + 0.5, np.arange(-1, grid.columns + 1) + 0.5)
-    # Under its old name, so that what was handed over for this alone is let go.
+    # Rebind the name, so that an array that only the call held is released.
     coverage = np.pad(coverage, 1)
     generator = contourpy.contour_generator(x, y, coverage, fill_type=contourpy.FillType.OuterOffset)
     filled: Any = generator.filled(0.5, np.inf)

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+import shapely
+from harness.effort import examples
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely.affinity import rotate
+
+from roofbench.detectors.shared.regularise import regularise
+from roofbench.scenes.geodata.outlines import coverage_of_mask, trace
+from roofbench.scenes.geodata.raster import Grid
+
+GRID = Grid(100.0, 240.0, 0.5, 80, 100)
+
+
+def centres():
+    column, row = np.meshgrid(np.arange(GRID.columns) + 0.5, np.arange(GRID.rows) + 0.5)
+    return GRID.to_world(row, column)
+
+
+def covered(polygon):
+    """Share of each cell that a polygon covers, exactly."""
+    x, y = centres()
+    cells = shapely.box(x - 0.25, y - 0.25, x + 0.25, y + 0.25)
+    return (shapely.area(shapely.intersection(cells, polygon)) / 0.25).astype(np.float32)
+
+
+def traced(polygon):
+    share = covered(polygon)
+    return trace(coverage_of_mask(share >= 0.5, share), GRID)
+
+
+def iou(one, two):
+    return one.intersection(two).area / one.union(two).area
+
+
+@pytest.mark.parametrize("angle", [0, 9, 23, 45, 80])
+def test_a_t_shape_gets_its_eight_corners_back_at_any_angle(angle):
+    shape = shapely.box(112, 222, 136, 230).union(shapely.box(120, 208, 128, 222))
+    shape = rotate(shape, angle, origin="centroid")
+    (regular,) = regularise(traced(shape), 0.5)
+    assert shapely.get_num_coordinates(regular) - 1 == 8
+    assert iou(regular, shape) > 0.97
+
+
+def test_walls_that_follow_no_main_direction_stay_as_they_are():
+    # A house with one wall at 30 degrees to the others.
+    house = shapely.Polygon([(110, 210), (130, 210), (130, 216), (116, 224.1), (110, 224.1)])
+    (regular,) = regularise(traced(house), 0.5)
+    assert iou(regular, house) > 0.97
+    assert shapely.get_num_coordinates(regular) - 1 == 5
+
+
+def test_a_round_tower_is_not_squared():
+    tower = shapely.Point(125, 220).buffer(9)
+    (regular,) = regularise(traced(tower), 0.5)
+    assert iou(regular, tower) > 0.9
+
+
+@examples(25)
+@given(seed=st.integers(0, 10_000))
+def test_regularised_outlines_are_valid_and_agree_with_what_was_traced(seed):
+    rng = np.random.default_rng(seed)
+    boxes = [
+        rotate(shapely.box(x, y, x + w, y + h), angle)
+        for x, y, w, h, angle in rng.uniform([108, 206, 4, 4, 0], [130, 226, 14, 12, 90], (5, 5))
+    ]
+    polygons = traced(shapely.union_all(boxes))
+    regular = regularise(polygons, 0.5)
+    assert shapely.is_valid(regular).all()
+    for one, two in zip(regular, polygons, strict=True):
+        assert iou(one, two) > 0.8
