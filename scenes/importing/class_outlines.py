@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ..geodata.footprints import Footprints
+from ..geodata.outlines import coverage_of_mask, simplify, trace
 from ..geodata.points import PointCloud
 from ..geodata.raster import Grid
 
@@ -56,7 +57,6 @@ def outlines_of_class(
     InputError
         No classification or no point of this class.
     """
-    from rasterio import Affine, features
     from scipy import ndimage
 
     if points.classification is None:
@@ -74,9 +74,8 @@ def outlines_of_class(
     disc = ndimage.generate_binary_structure(2, 1)
     mask = ndimage.binary_closing(mask, disc)
     mask = ndimage.binary_opening(mask, np.ones((3, 3), dtype=bool))
-    traced = features.shapes(mask.astype(np.uint8), mask=mask, connectivity=4, transform=Affine(*grid.transform))
-    polygons = [shapely.geometry.shape(geometry) for geometry, _ in traced]
-    outlines = np.array([_simplified(polygon, grid.gsd, minimum_area / 4) for polygon in polygons], dtype=object)
+    traced = trace(coverage_of_mask(mask), grid)
+    outlines = simplify(_without_small_holes(traced, minimum_area / 4), _TOLERANCE * grid.gsd)
     if len(outlines):
         outlines = outlines[shapely.area(outlines) >= minimum_area]
     # From north to south, west to east, so that the numbering reads like a page.
@@ -98,21 +97,10 @@ def _padded(grid: Grid) -> Grid:
     return Grid(grid.west - 3 * grid.gsd, grid.north + 3 * grid.gsd, grid.gsd, grid.rows + 6, grid.columns + 6)
 
 
-def _simplified(polygon: shapely.Polygon, cell: float, smallest_hole: float) -> shapely.Polygon:
-    """Return the polygon without stair steps (Douglas-Peucker) and without tiny holes.
-
-    It runs through the midpoints of the cell edges: those of a slanting wall lie along it, the corners beside it.
-    """
-    rings = [_edge_midpoints(ring, cell) for ring in (polygon.exterior, *polygon.interiors)]
-    holes = [ring for ring in rings[1:] if shapely.area(shapely.Polygon(ring)) >= smallest_hole]
-    smooth = shapely.make_valid(shapely.Polygon(rings[0], holes))
-    parts = shapely.get_parts(shapely.get_parts(shapely.simplify(smooth, _TOLERANCE * cell)))
-    return max(
-        (part for part in parts if part.geom_type == "Polygon"), key=lambda part: part.area, default=shapely.Polygon()
-    )
-
-
-def _edge_midpoints(ring: shapely.LinearRing, cell: float) -> NDArray[np.float64]:
-    corners = shapely.get_coordinates(shapely.segmentize(ring, 1.001 * cell))
-    middles = (corners[:-1] + corners[1:]) / 2
-    return np.concatenate([middles, middles[:1]])
+def _without_small_holes(polygons: NDArray[np.object_], smallest: float) -> NDArray[np.object_]:
+    """Return the polygons with holes below an area, m2, filled."""
+    filled = []
+    for polygon in polygons:
+        holes = [hole for hole in polygon.interiors if shapely.Polygon(hole).area >= smallest]
+        filled.append(shapely.Polygon(polygon.exterior, holes))
+    return np.array(filled, dtype=object)
