@@ -20,6 +20,11 @@ __all__ = ["PairDistances", "corner_distances", "pair_distances", "polis_distanc
 
 _CHUNK = 1 << 16
 
+#: From so many pairs of general outlines on, distances are computed by compiled code, which takes a moment to load.
+_MANY_OUTLINES = 10_000
+#: Most vertex pairs of two outlines for which all are compared; above, GEOS searches edges by an index.
+_MOST_VERTEX_PAIRS = 1 << 18
+
 
 @dataclass(frozen=True, eq=False)
 class PairDistances:
@@ -58,10 +63,29 @@ def pair_distances(
         one, two = corners[0][rows[0][quick]], corners[1][rows[1][quick]]
         outline[quick] = corner_distances(one, two)
         polis[quick] = (_vertices_to_edges(one, two) + _vertices_to_edges(two, one)) / 2
-        slow = np.flatnonzero(~both[part]) + start
-        polis[slow] = polis_distances(detected.polygons[pairs[0][slow]], reference.polygons[pairs[1][slow]])
-        outline[slow] = polis[slow]
+    general = np.flatnonzero(~both)
+    polis[general] = _polis(detected, reference, pairs[0][general], pairs[1][general])
+    outline[general] = polis[general]
     return PairDistances(outline, both, polis)
+
+
+def _polis(
+    detected: Footprints, reference: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return PoLiS of pairs of general outlines."""
+    many = np.zeros(len(first), dtype=bool)
+    if len(first) > _MANY_OUTLINES:
+        many = np.diff(detected.rings[0])[first] * np.diff(reference.rings[0])[second] <= _MOST_VERTEX_PAIRS
+    distances = np.empty(len(first))
+    if many.any():
+        from .vertex_distances import vertex_distances  # compiled code: a comparison of small files does without
+
+        distances[many] = vertex_distances(detected, reference, first[many], second[many])
+    rest = np.flatnonzero(~many)
+    for start in range(0, len(rest), _CHUNK):
+        rows = rest[start : start + _CHUNK]
+        distances[rows] = polis_distances(detected.polygons[first[rows]], reference.polygons[second[rows]])
+    return distances
 
 
 def corner_distances(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:

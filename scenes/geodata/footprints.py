@@ -298,7 +298,10 @@ def _mend(
     geometries: NDArray[np.object_],
 ) -> tuple[NDArray[np.object_], tuple[Repair, ...], NDArray[np.bool_]]:
     """Return clean polygons, the repairs, and the mask of rows that were kept."""
-    geometries = shapely.force_2d(geometries)
+    if shapely.has_z(geometries).any() or shapely.has_m(geometries).any():
+        geometries = shapely.force_2d(geometries)
+    else:
+        geometries = geometries.copy()
     repairs: list[Repair] = []
     kept = np.ones(len(geometries), dtype=bool)
 

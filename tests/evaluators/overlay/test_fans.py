@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import shapely
+from builders.outlines import star, stars
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -17,22 +18,6 @@ def area_of(one, two, **options):
     sides = outlines_of(Footprints.of([one])), outlines_of(Footprints.of([two]))
     row = np.zeros(1, dtype=np.int64)
     return float(fan_areas(*sides, row, row, **options)[0])
-
-
-def star(rng, vertices, centre, radius=7.0):
-    angle = np.sort(rng.uniform(0, 2 * np.pi, vertices))
-    reach = rng.uniform(0.3, 1.0, vertices) * radius
-    return shapely.Polygon(np.stack([reach * np.cos(angle), reach * np.sin(angle)], axis=1) + centre)
-
-
-def stars(seed, count, vertices, offset=0.0):
-    rng = np.random.default_rng(seed)
-    found = []
-    while len(found) < count:
-        polygon = star(rng, vertices, rng.uniform(-4, 4, 2) + offset)
-        if polygon.is_valid:
-            found.append(polygon)
-    return Footprints.of(found)
 
 
 @pytest.mark.parametrize("vertices", [3, 5, 10, 30, 100])
