@@ -19,6 +19,7 @@ DETECTORS = Registry(
         "ndsm": "detectors.ndsm.ndsm_detector:NDSM",
         "original": "detectors.lines.original:Original",
         "mpp": "detectors.mpp.mpp_detector:MPP",
+        "mpp-printed": "detectors.mpp.printed_detector:MPPPrinted",
     },
 )
 

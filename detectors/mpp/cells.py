@@ -33,9 +33,12 @@ from ...scenes.geodata.raster import Elevation, Grid
 from ...scenes.ground.lowest_points import coverage
 from .workers import ALONE, Workers
 
-__all__ = ["HIGH", "LOW", "VOID", "Cells", "cell_size", "make_cells"]
+__all__ = ["FEWEST_POINTS", "HIGH", "LOW", "VOID", "Cells", "cell_size", "has_points", "make_cells"]
 
 VOID, LOW, HIGH = np.uint8(0), np.uint8(1), np.uint8(2)
+
+#: Scenes with fewer points hold nothing that can be detected.
+FEWEST_POINTS = 20
 
 #: Points higher above ground than this many metres are birds and clouds (the tallest building of 2025 has 828 m).
 _SKY = 900.0
@@ -65,6 +68,11 @@ class Cells:
     height: NDArray[np.int32]
     state: NDArray[np.uint8]
     openness: NDArray[np.uint8]
+
+
+def has_points(z: NDArray[np.float64]) -> bool:
+    """Return whether a scene has enough finite elevations; the first ones are looked at first."""
+    return any(np.count_nonzero(np.isfinite(part)) >= FEWEST_POINTS for part in (z[: 100 * FEWEST_POINTS], z))
 
 
 def cell_size(

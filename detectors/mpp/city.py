@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .annealing import Annealed, Schedule, anneal
 from .moves import MOVES
+from .parameters import MPPParameters
 from .polish import polish
 from .preparation import Prepared
 from .random_stream import stream
@@ -20,15 +21,23 @@ from .tiles import Tile, tiles_of, work_off
 from .walls import close_walls
 from .workers import Workers
 
-if TYPE_CHECKING:
-    from .mpp_detector import MPP
-
 __all__ = ["join_traces", "sample_city", "total_energy"]
 
 _Rectangles = NDArray[np.float64]
 
+#: First and last temperature of the chain.
+_HOT, _COLD = 3.0, 0.1
+#: Expected buildings per km2 before the data are seen (lambda).
+_INTENSITY = 200.0
+#: Shares of births and deaths, and of splits and merges, among the moves; share of births that the data propose.
+_JUMP_SHARE, _SPLIT_SHARE, _DATA_BIRTHS = 0.3, 0.1, 0.9
+#: Metres between the centres of two buildings that may merge.
+_MERGE_REACH = 20.0
 
-def sample_city(parameters: MPP, prepared: Prepared, seed: int, workers: Workers) -> tuple[_Rectangles, list[Annealed]]:
+
+def sample_city(
+    parameters: MPPParameters, prepared: Prepared, seed: int, workers: Workers
+) -> tuple[_Rectangles, list[Annealed]]:
     """Anneal every tile, then polish the seams, close the walls and take in what is no building by itself."""
     grid, model, tables = prepared.grid, prepared.model, prepared.tables
     size = max(parameters.tile, 2.0 * parameters.largest_side)
@@ -71,19 +80,19 @@ def sample_city(parameters: MPP, prepared: Prepared, seed: int, workers: Workers
     return rectangles, [results[key] for key in sorted(results)]
 
 
-def _schedule(parameters: MPP, tile: Tile, cell: float, boxes: int) -> Schedule:
+def _schedule(parameters: MPPParameters, tile: Tile, cell: float, boxes: int) -> Schedule:
     """Return how the chain of a tile is run: proposals by its area, and for each box."""
     x0, y0, x1, y1 = tile.window
     area = (x1 - x0) * (y1 - y0) * cell * cell
     return Schedule(
         proposals=max(int(parameters.effort * (0.2 * area + 60 * boxes)), 1),
-        hot=parameters.hot,
-        cold=parameters.cold,
-        intensity=parameters.intensity * 1e-6 * cell * cell,
-        jump_share=parameters.jump_share,
-        split_share=parameters.split_share,
-        data_share=parameters.data_births,
-        merge_reach=20.0 / cell,
+        hot=_HOT,
+        cold=_COLD,
+        intensity=_INTENSITY * 1e-6 * cell * cell,
+        jump_share=_JUMP_SHARE,
+        split_share=_SPLIT_SHARE,
+        data_share=_DATA_BIRTHS,
+        merge_reach=_MERGE_REACH / cell,
         greedy=parameters.start == "greedy",
         sweeps=parameters.sweeps,
     )

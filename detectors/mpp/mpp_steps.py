@@ -15,7 +15,7 @@ from .preparation import Prepared
 from .rectangles import to_world
 from .tables import MILLI
 
-__all__ = ["mpp_steps"]
+__all__ = ["convergence_step", "mpp_steps"]
 
 
 def mpp_steps(prepared: Prepared, buildings: NDArray[np.object_], trace: Mapping[str, Any]) -> Iterator[Step]:
@@ -54,7 +54,7 @@ def mpp_steps(prepared: Prepared, buildings: NDArray[np.object_], trace: Mapping
         relief,
         OutlineLayer(boxes, "suggested box", Role.CANDIDATE),
     )
-    yield _convergence(trace)
+    yield convergence_step(trace)
     yield _map(
         prepared,
         "buildings",
@@ -68,7 +68,8 @@ def _map(prepared: Prepared, name: str, caption: str, *layers: Layer) -> Step:
     return Step(name, caption, (MapPanel(extent=prepared.grid.extent, layers=layers),))
 
 
-def _convergence(trace: Mapping[str, Any]) -> Step:
+def convergence_step(trace: Mapping[str, Any]) -> Step:
+    """Return the convergence of a simulation; `trace` may lack any column but ``proposals``."""
     proposals = Axis(label="proposals")
     count = np.asarray(trace["proposals"])
     panels = [
@@ -78,6 +79,7 @@ def _convergence(trace: Mapping[str, Any]) -> Step:
             ("temperature", Axis(label="temperature", logarithmic=True)),
             ("buildings", Axis(label="buildings")),
         )
+        if column in trace
     ]
     if trace.get("tried"):
         curves = tuple(
@@ -85,11 +87,7 @@ def _convergence(trace: Mapping[str, Any]) -> Step:
             for move, tried in trace["tried"].items()
         )
         panels.append(ChartPanel(x=proposals, y=Axis(label="accepted", unit="%", logarithmic=True), series=curves))
-    return Step(
-        "convergence",
-        "Energy, temperature, number of buildings and accepted share of each move over the chain.",
-        tuple(panels),
-    )
+    return Step("convergence", "How the simulation went, and the accepted share of each move.", tuple(panels))
 
 
 def _share(accepted: NDArray[np.float64], tried: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +21,20 @@ from .candidates import propose_boxes
 from .cells import Cells, cell_size, make_cells
 from .energy import Model, own_energies
 from .memory import give_back
+from .parameters import MPPParameters
 from .superstructures import lower_superstructures
 from .tables import LONGEST, TALLEST, Tables, make_tables
 from .workers import Workers
 
-if TYPE_CHECKING:
-    from .mpp_detector import MPP
-
 __all__ = ["Prepared", "prepare"]
+
+#: Square metres: largest rough place that counts as a structure of the roof around it, smallest box that is proposed.
+_LARGEST_STRUCTURE, _SMALLEST_BOX = 40.0, 6.0
+#: Metres: steps between neighbouring cells that the patches of boxes may hold; a low one separates houses of different
+#: height, one that is never reached keeps a block together.
+_BOX_STEPS = (0.4, 1.0, 1000.0)
+#: Share of the least height of a roof below which a point is low.
+_LOW_SHARE = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +73,7 @@ class Prepared:
     energies: NDArray[np.float64]
 
 
-def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers) -> Prepared:
+def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, workers: Workers) -> Prepared:
     """Turn the cloud into cells, classes, tables and boxes."""
     cell = parameters.cell or cell_size(points.x, points.y, scene.extent, workers=workers)
     if math.sqrt(2) * parameters.largest_side > LONGEST * cell:
@@ -78,10 +83,8 @@ def prepare(parameters: MPP, points: PointCloud, scene: Scene, workers: Workers)
             f"or raise cell"
         )
     background, height, state, score, fitted = _classes(parameters, points, scene, cell, workers)
-    boxes = np.empty((0, 5))
-    if parameters.data_births > 0 or parameters.start == "greedy":
-        least = math.ceil(6 / cell**2)
-        boxes = propose_boxes(height, fitted, steps=(0.4, 1.0, 1000.0), least_cells=least, workers=workers)
+    least = math.ceil(_SMALLEST_BOX / cell**2)
+    boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, workers=workers)
     kept = _shortened(height, workers)
     del height
     give_back()
@@ -108,10 +111,10 @@ def _shortened(height: NDArray[np.int32], workers: Workers) -> NDArray[np.uint16
 
 
 def _classes(
-    parameters: MPP, points: PointCloud, scene: Scene, cell: float, workers: Workers
+    parameters: MPPParameters, points: PointCloud, scene: Scene, cell: float, workers: Workers
 ) -> tuple[Background, NDArray[np.int32], NDArray[np.uint8], NDArray[np.int16], NDArray[np.bool_]]:
     """Return the classes of the scene, and height, state, score and whether it is fitted of each cell."""
-    low = 0.8 * parameters.least_height
+    low = _LOW_SHARE * parameters.least_height
     cells = make_cells(points, scene.heights.ground, Grid.covering(scene.extent, cell), low=low, workers=workers)
     background, bins = estimate_background(cells, workers=workers)
     fitted = _fitted(parameters, cells, bins, background, workers)
@@ -122,7 +125,7 @@ def _classes(
             fitted,
             step=parameters.roof_step,
             share=parameters.carried_share,
-            most=int(parameters.furniture / cell**2),
+            most=int(_LARGEST_STRUCTURE / cell**2),
             workers=workers,
         )
         cells = replace(cells, height=height, state=state)
@@ -143,13 +146,13 @@ def _classes(
 
 
 def _fitted(
-    parameters: MPP, cells: Cells, bins: NDArray[np.int16], background: Background, workers: Workers
+    parameters: MPPParameters, cells: Cells, bins: NDArray[np.int16], background: Background, workers: Workers
 ) -> NDArray[np.bool_]:
     weight, limit = parameters.texture_weight, parameters.texture_limit
     return fitted_cells(cells, bins, background, texture_weight=weight, texture_limit=limit, workers=workers)
 
 
-def _model(parameters: MPP, cell: float) -> Model:
+def _model(parameters: MPPParameters, cell: float) -> Model:
     """Return the constants of the energy in units of cells."""
     return Model(
         weight=cell * cell,

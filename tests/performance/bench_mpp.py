@@ -40,7 +40,7 @@ STAGES = {
     "chains": ("annealing", "run_chain"),
     "polish of seams": ("city", "polish"),
     "walls": ("city", "close_walls"),
-    "footprints": ("detector", "as_buildings"),
+    "footprints": ("mpp_detector", "as_buildings"),
 }
 OUTLINE = "rectangles"
 EFFORTS = (0, 0.1, 0.25, 0.5, 1, 2, 4)

@@ -8,6 +8,7 @@ import pytest
 import shapely
 
 from roofbench.core.errors import ParameterError
+from roofbench.detectors.mpp import city
 from roofbench.detectors.mpp.tiles import tiles_of
 from roofbench.detectors.registry import make_detector
 from roofbench.scenes.geodata.points import PointCloud
@@ -178,27 +179,39 @@ def test_rectangles_of_more_cells_than_the_sums_hold_are_refused_with_what_to_do
     assert len(detect(cloud(), "mpp[cell=0.25,largest_side=90]")) >= 3
 
 
-@pytest.mark.parametrize("crossed", ["least_side=9,largest_side=5", "hot=0.05"])
-def test_limits_that_cross_each_other_are_refused(crossed):
-    with pytest.raises(ParameterError, match="is more than"):
-        make_detector(f"mpp[{crossed}]")
+def test_sides_that_cross_each_other_are_refused():
+    with pytest.raises(ParameterError, match="least_side of 9 is more than largest_side of 5"):
+        make_detector("mpp[least_side=9,largest_side=5]")
 
 
-def test_without_births_from_data_the_sampler_still_finds_the_houses():
-    found = detect(cloud(7), "mpp[data_births=0,start=empty,hot=30,effort=30]")
+@pytest.mark.parametrize("value", ["paper", "reversible"])
+def test_the_former_mode_is_answered_with_the_detector_of_the_printed_algorithm(value):
+    with pytest.raises(ParameterError, match="mpp-printed"):
+        make_detector(f"mpp[mode={value}]")
+
+
+@pytest.mark.parametrize("name", ["workers", "hot", "intensity", "furniture"])
+def test_removed_parameters_are_answered_with_what_to_do(name):
+    with pytest.raises(ParameterError, match=rf"mpp: no parameter '{name}': .*(threads|leave it out)"):
+        make_detector(f"mpp[{name}=1]")
+
+
+def test_every_parameter_says_what_it_is_and_where_it_is_from():
+    for detector in ("mpp", "mpp-printed"):
+        for rule in make_detector(detector).parameters().values():
+            assert rule.doc
+            assert "Yu et al. 2013" in rule.source or rule.source in (
+                "roofbench",
+                "Awrangjeb et al. 2010, height threshold T_h",
+            )
+
+
+def test_without_births_from_data_the_sampler_still_finds_the_houses(monkeypatch):
+    monkeypatch.setattr(city, "_DATA_BIRTHS", 0.0)
+    monkeypatch.setattr(city, "_HOT", 30.0)
+    found = detect(cloud(7), "mpp[start=empty,effort=30]")
     truth = shapely.union_all([shapely.box(*roof[:4]) for roof in ROOFS])
     assert shapely.intersection(shapely.union_all(found.polygons), truth).area > 0.85 * truth.area
-
-
-def test_the_printed_algorithm_runs_repeats_and_finds_the_large_flat_roof():
-    found = detect(cloud(), "mpp[mode=paper]")
-    assert wkb(found) == wkb(detect(cloud(), "mpp[mode=paper]"))
-    hall = shapely.box(*ROOFS[2][:4])
-    assert shapely.area(shapely.intersection(shapely.union_all(found.polygons), hall)) > 0.5 * hall.area
-    record = found.metadata
-    assert json.loads(json.dumps(record)) == record
-    assert record["mode"] == "paper"
-    assert len(record["trace"]["energy"]) == len(record["trace"]["buildings"])
 
 
 def test_the_steps_end_with_the_buildings_of_the_same_run():

@@ -1,0 +1,265 @@
+"""The model of Yu, Li, Guan & Wang (2013) as printed: likelihoods, priors and acceptance ratios of equations 1 to 16.
+
+Nouns
+-----
+sums
+    n, sum of z and sum of z2 of a set of points: all that a Gaussian likelihood needs.
+sum table
+    Running sums from the west over the rows of a grid, shape (rows, columns + 1, 3), from which the sums of a rectangle
+    follow in one scan over its rows. A cell belongs to a rectangle when its centre does.
+building
+    x, y, length, width (cells), angle (radians), nu and tau (metres): a rectangle, and mean and standard deviation of
+    the elevations of its roof.
+class
+    Ground or tree; its Gaussian is ``(mean, standard deviation)`` in metres.
+
+All ratios are logarithms, without the bound at 1 (min(1, r) >= p_f and r >= p_f are the same for p_f <= 1).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.kernels import kernel
+from .rectangles import row_span
+
+__all__ = [
+    "ANGLE",
+    "GROUND",
+    "LENGTH",
+    "NU",
+    "TAU",
+    "TREE",
+    "WIDTH",
+    "PrintedModel",
+    "X",
+    "Y",
+    "birth_log_ratio",
+    "building_sums",
+    "centre_log_ratio",
+    "common_sums",
+    "death_log_ratio",
+    "log_likelihood",
+    "log_posterior_gain",
+    "log_prior",
+    "matching_share",
+    "sum_table",
+    "update_log_ratio",
+]
+
+_Floats = NDArray[np.float64]
+
+#: Rows of `PrintedModel.classes`.
+GROUND, TREE = 0, 1
+#: Columns of a building.
+X, Y, LENGTH, WIDTH, ANGLE, NU, TAU = range(7)
+
+
+class PrintedModel(NamedTuple):
+    """Constants of the model.
+
+    Attributes
+    ----------
+    classes : ndarray, shape (2, 2)
+        Mean and standard deviation of the elevation of ground and trees (mu and sigma of equation 1), metres.
+    prior : ndarray, shape (4, 2)
+        Mean and standard deviation of the Gaussian priors of length and width (cells), nu and tau (metres).
+    match : float
+        A point matches the prior model of its building within this many tau of nu.
+    log_birth : float
+        log(lambda b_k / d_{k+1}): what equation 12 adds to the ratio of likelihoods; 0 for equation 13.
+    union : bool
+        Whether equation 6 compares both states over the union of both windows, as equations 8 to 11 do.
+    """
+
+    classes: _Floats
+    prior: _Floats
+    match: float
+    log_birth: float
+    union: bool
+
+
+def sum_table(index: NDArray[np.intp], z: _Floats, shape: tuple[int, int]) -> _Floats:
+    """Return the sum table of points.
+
+    Parameters
+    ----------
+    index : ndarray of int, shape (n,)
+        Flat cell of each point.
+    z : ndarray, shape (n,)
+        Metres; near 0, so that sums of squares keep their digits.
+    shape : tuple of int
+        Rows and columns.
+    """
+    sums = [np.bincount(index, weights=z**power, minlength=shape[0] * shape[1]) for power in range(3)]
+    table = np.zeros((shape[0], shape[1] + 1, 3))
+    table[:, 1:] = np.stack(sums, axis=-1).reshape(*shape, 3).cumsum(axis=1)
+    return table
+
+
+@kernel
+def _span(building: _Floats, row: int, columns: int) -> tuple[int, int]:
+    """Return the cells first..last of a row whose centre lies in a building."""
+    cos, sin = math.cos(building[ANGLE]), math.sin(building[ANGLE])
+    low, high = row_span(row + 0.5 - building[Y], 0.5 * building[LENGTH], 0.5 * building[WIDTH], cos, sin)
+    if low > high:
+        return 0, 0
+    first = min(max(math.ceil(building[X] + low - 0.5), 0), columns)
+    return first, max(min(math.floor(building[X] + high + 0.5), columns), first)
+
+
+@kernel
+def _rows(building: _Floats, rows: int) -> tuple[int, int]:
+    """Return the rows that a building reaches."""
+    tall = 0.5 * (building[LENGTH] * abs(math.sin(building[ANGLE])) + building[WIDTH] * abs(math.cos(building[ANGLE])))
+    return max(math.floor(building[Y] - tall), 0), min(math.ceil(building[Y] + tall), rows)
+
+
+@kernel
+def building_sums(building: _Floats, table: _Floats, sums: _Floats) -> None:
+    """Fill the sums of the points in a building."""
+    sums[:] = 0.0
+    top, bottom = _rows(building, table.shape[0])
+    for row in range(top, bottom):
+        first, last = _span(building, row, table.shape[1] - 1)
+        for k in range(3):
+            sums[k] += table[row, last, k] - table[row, first, k]
+
+
+@kernel
+def common_sums(one: _Floats, other: _Floats, table: _Floats, sums: _Floats) -> None:
+    """Fill the sums of the points in both of two buildings."""
+    sums[:] = 0.0
+    top, bottom = _rows(one, table.shape[0])
+    for row in range(top, bottom):
+        first, last = _span(one, row, table.shape[1] - 1)
+        begin, end = _span(other, row, table.shape[1] - 1)
+        first, last = max(first, begin), min(last, end)
+        if last > first:
+            for k in range(3):
+                sums[k] += table[row, last, k] - table[row, first, k]
+
+
+@kernel
+def log_likelihood(sums: _Floats, mean: float, spread: float) -> float:
+    """Return the log-likelihood of points under one Gaussian (equation 2)."""
+    squares = sums[2] - 2.0 * mean * sums[1] + mean * mean * sums[0]
+    return float(-sums[0] * math.log(math.sqrt(2.0 * math.pi) * spread) - 0.5 * squares / (spread * spread))
+
+
+@kernel
+def matching_share(sums: _Floats, nu: float, tau: float, match: float) -> float:
+    """Return n / N of equation 6: the share of points within `match` tau of nu, as of a Gaussian with these sums."""
+    if sums[0] < 0.5:
+        return 0.0
+    centre = sums[1] / sums[0]
+    width = math.sqrt(max(sums[2] / sums[0] - centre * centre, 1e-6)) * math.sqrt(2.0)
+    upper, lower = nu + match * tau - centre, nu - match * tau - centre
+    return 0.5 * (math.erf(upper / width) - math.erf(lower / width))
+
+
+@kernel
+def log_prior(building: _Floats, prior: _Floats) -> float:
+    """Return the logarithm of equation 5 for one building; place and angle are uniform, and constants left out."""
+    total = 0.0
+    for k, column in enumerate((LENGTH, WIDTH, NU, TAU)):
+        total -= 0.5 * ((building[column] - prior[k, 0]) / prior[k, 1]) ** 2
+    return float(total)
+
+
+@kernel
+def _marks_log_ratio(new: _Floats, old: _Floats, after: _Floats, before: _Floats, model: PrintedModel) -> float:
+    """Return the logarithm of P(B*) exp(n*/N*) / (P(B) exp(n/N)), which equations 6 and 8 to 11 share."""
+    ratio = log_prior(new, model.prior) - log_prior(old, model.prior)
+    ratio += matching_share(after, new[NU], new[TAU], model.match)
+    return float(ratio - matching_share(before, old[NU], old[TAU], model.match))
+
+
+@kernel
+def update_log_ratio(new: _Floats, old: _Floats, table: _Floats, model: PrintedModel) -> float:
+    """Return the logarithm of equation 6; minus infinity where the new window holds no point.
+
+    As printed it compares the likelihoods of two different point sets. With `PrintedModel.union` points that only one
+    of the windows holds count in the other state as the class that explains them better.
+    """
+    before, after, common = np.empty(3), np.empty(3), np.empty(3)
+    building_sums(old, table, before)
+    building_sums(new, table, after)
+    if after[0] < 0.5:
+        return -np.inf
+    ratio = log_likelihood(after, new[NU], new[TAU]) - log_likelihood(before, old[NU], old[TAU])
+    if model.union:
+        common_sums(new, old, table, common)
+        ratio += _best_class(before - common, model.classes) - _best_class(after - common, model.classes)
+    return float(ratio + _marks_log_ratio(new, old, after, before, model))
+
+
+@kernel
+def _best_class(sums: _Floats, classes: _Floats) -> float:
+    """Return the log-likelihood of points under the class that explains them better."""
+    ground = log_likelihood(sums, classes[GROUND, 0], classes[GROUND, 1])
+    return float(max(ground, log_likelihood(sums, classes[TREE, 0], classes[TREE, 1])))
+
+
+@kernel
+def centre_log_ratio(
+    new: _Floats, old: _Floats, released: int, taken: int, table: _Floats, model: PrintedModel
+) -> float:
+    """Return the logarithm of one of equations 8 to 11; minus infinity where the new window holds no point.
+
+    Parameters
+    ----------
+    new, old : ndarray, shape (7,)
+        Building after and before.
+    released, taken : int
+        Class of the points that the building leaves and of those that it takes in: equation 8 is (ground, ground), 9
+        (tree, ground), 10 (ground, tree), 11 (tree, tree).
+    table : ndarray
+    model : PrintedModel
+    """
+    before, after, common = np.empty(3), np.empty(3), np.empty(3)
+    building_sums(old, table, before)
+    building_sums(new, table, after)
+    if after[0] < 0.5:
+        return -np.inf
+    common_sums(new, old, table, common)
+    gained, left = after - common, before - common
+    ratio = log_likelihood(gained, new[NU], new[TAU]) - log_likelihood(left, old[NU], old[TAU])
+    ratio += log_likelihood(left, model.classes[released, 0], model.classes[released, 1])
+    ratio -= log_likelihood(gained, model.classes[taken, 0], model.classes[taken, 1])
+    return float(ratio + _marks_log_ratio(new, old, after, before, model))
+
+
+@kernel
+def birth_log_ratio(building: _Floats, other: int, table: _Floats, model: PrintedModel) -> float:
+    """Return the logarithm of equation 14 (`other` ground) or 15 (tree), times the factor that equation 12 adds.
+
+    Minus infinity where the window holds no point.
+    """
+    sums = np.empty(3)
+    building_sums(building, table, sums)
+    if sums[0] < 0.5:
+        return -np.inf
+    ratio = log_likelihood(sums, building[NU], building[TAU])
+    return float(ratio - log_likelihood(sums, model.classes[other, 0], model.classes[other, 1]) + model.log_birth)
+
+
+@kernel
+def death_log_ratio(building: _Floats, table: _Floats, model: PrintedModel) -> float:
+    """Return the logarithm of equation 16: the points of the building count as the class that explains them better."""
+    sums = np.empty(3)
+    building_sums(building, table, sums)
+    return float(_best_class(sums, model.classes) - log_likelihood(sums, building[NU], building[TAU]) - model.log_birth)
+
+
+@kernel
+def log_posterior_gain(building: _Floats, table: _Floats, model: PrintedModel) -> float:
+    """Return what a building adds to the log-posterior of equation 3, without the Poisson term of their number."""
+    sums = np.empty(3)
+    building_sums(building, table, sums)
+    gain = log_likelihood(sums, building[NU], building[TAU]) - _best_class(sums, model.classes)
+    return float(gain + log_prior(building, model.prior))

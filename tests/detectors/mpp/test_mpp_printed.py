@@ -1,0 +1,262 @@
+"""The printed algorithm: each equation gives the numbers worked by hand, and the simulation follows the flow chart."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import shapely
+from naive import mpp as naive
+
+from roofbench.detectors.mpp.printed_chain import Operation, PrintedSchedule, PrintedTrace, run_printed
+from roofbench.detectors.mpp.printed_detector import class_gaussians
+from roofbench.detectors.mpp.printed_model import (
+    GROUND,
+    TREE,
+    PrintedModel,
+    birth_log_ratio,
+    building_sums,
+    centre_log_ratio,
+    common_sums,
+    death_log_ratio,
+    log_likelihood,
+    log_posterior_gain,
+    log_prior,
+    matching_share,
+    sum_table,
+    update_log_ratio,
+)
+from roofbench.detectors.mpp.random_stream import stream
+from roofbench.detectors.registry import make_detector
+from roofbench.scenes.geodata.points import PointCloud
+from roofbench.scenes.geodata.raster import Elevation, Grid
+from roofbench.scenes.scene import Scene
+
+ROWS, COLUMNS = 8, 10
+#: Ground N(0, 1), trees N(4, 2); priors of length, width, nu and tau.
+CLASSES = np.array([[0.0, 1.0], [4.0, 2.0]])
+PRIOR = np.array([[4.0, 1.0], [2.0, 0.5], [6.0, 2.0], [0.5, 0.25]])
+MODEL = PrintedModel(CLASSES, PRIOR, match=2.0, log_birth=0.0, union=False)
+#: One point in each cell of columns 2 to 5 of rows 3 and 4, at 6 m or 5 m.
+Z = {(3, 2): 6.0, (3, 3): 6.0, (3, 4): 5.0, (3, 5): 6.0, (4, 2): 6.0, (4, 3): 5.0, (4, 4): 6.0, (4, 5): 6.0}
+#: Covers all eight points; its right half and two empty columns; its left half alone.
+OLD = np.array([4.0, 4.0, 4.0, 2.0, 0.0, 6.0, 0.5])
+SHIFTED = np.array([6.0, 4.0, 4.0, 2.0, 0.0, 6.0, 0.5])
+EMPTY = np.array([26.0, 4.0, 4.0, 2.0, 0.0, 6.0, 0.5])
+SHORTER = np.array([3.0, 4.0, 2.0, 2.0, 0.0, 5.5, 0.5])
+
+
+def table(points=Z):
+    index = np.array([row * COLUMNS + column for row, column in points])
+    return sum_table(index, np.array(list(points.values())), (ROWS, COLUMNS))
+
+
+def log_normal(z, mean, spread):
+    return -math.log(spread * math.sqrt(2 * math.pi)) - (z - mean) ** 2 / (2 * spread**2)
+
+
+def sums(*z):
+    return np.array([len(z), sum(z), sum(value * value for value in z)], dtype=float)
+
+
+def test_the_sums_of_a_building_and_of_what_two_share_are_those_of_their_cells():
+    rng = np.random.default_rng(0)
+    index, z = rng.integers(0, 30 * 40, 3000), rng.normal(3, 4, 3000)
+    sums_of = sum_table(index, z, (30, 40))
+    found = np.empty(3)
+    for _ in range(100):
+        pair = np.column_stack(
+            [rng.uniform(0, 40, 2), rng.uniform(0, 30, 2), rng.uniform(1, 25, (2, 2)), rng.uniform(0, 3, 2)]
+        )
+        one, other = (naive.cells_inside(rectangle, 30, 40).ravel()[index] for rectangle in pair)
+        building_sums(pair[0], sums_of, found)
+        np.testing.assert_allclose(found, [one.sum(), z[one].sum(), (z[one] ** 2).sum()], atol=1e-9)
+        common_sums(*pair, sums_of, found)
+        both = one & other
+        np.testing.assert_allclose(found, [both.sum(), z[both].sum(), (z[both] ** 2).sum()], atol=1e-9)
+
+
+def test_equation_2_is_the_sum_of_logarithms_of_normal_densities():
+    # Two points at 6 and 5 under N(6, 0.5): -2 log(0.5 sqrt(2 pi)) - (0 + 1) / 0.5 = -0.4516 - 2.
+    assert log_likelihood(sums(6, 5), 6.0, 0.5) == pytest.approx(-2.45158, abs=1e-5)
+    assert log_likelihood(sums(6, 5), 6.0, 0.5) == pytest.approx(log_normal(6, 6, 0.5) + log_normal(5, 6, 0.5))
+
+
+def test_equation_5_is_gaussian_in_length_width_nu_and_tau():
+    assert log_prior(OLD, PRIOR) == 0.0
+    # Length 2 is two standard deviations short, nu 5.5 a quarter: -(4 + 0.0625) / 2.
+    assert log_prior(SHORTER, PRIOR) == pytest.approx(-2.03125)
+
+
+def test_the_share_of_matching_points_is_that_of_a_gaussian():
+    # All at 6, within 2 tau of nu; mean 5 m and spread 1 m against 6 m +- 1 m: between 0 and 2 standard deviations.
+    assert matching_share(sums(6, 6, 6), 6.0, 0.5, 2.0) == pytest.approx(1.0)
+    assert matching_share(sums(4, 6), 6.0, 0.5, 2.0) == pytest.approx(0.47725, abs=1e-5)
+    assert matching_share(sums(), 6.0, 0.5, 2.0) == 0.0
+
+
+def test_equation_6_as_printed_compares_the_likelihoods_of_two_point_sets():
+    # Old: six points at nu, two a metre below. New: 6, 6, 6, 5 around nu = 5.5.
+    before = 6 * log_normal(6, 6, 0.5) + 2 * log_normal(5, 6, 0.5)
+    after = 3 * log_normal(6, 5.5, 0.5) + log_normal(5, 5.5, 0.5)
+    assert before == pytest.approx(-5.80633, abs=1e-5)
+    assert after == pytest.approx(-2.90317, abs=1e-5)
+    shares = [matching_share(sums(6, 6, 6, 5), 5.5, 0.5, 2.0), matching_share(sums(*Z.values()), 6.0, 0.5, 2.0)]
+    expected = after - before - 2.03125 + shares[0] - shares[1]
+    assert update_log_ratio(SHORTER, OLD, table(), MODEL) == pytest.approx(expected, abs=1e-9)
+
+
+def test_equation_6_over_the_union_counts_what_is_left_as_ground_or_tree():
+    printed = update_log_ratio(SHORTER, OLD, table(), MODEL)
+    # Columns 4 and 5 are left: 5, 6, 6, 6, as trees.
+    left = log_normal(5, 4, 2) + 3 * log_normal(6, 4, 2)
+    assert left == pytest.approx(-8.07334, abs=1e-5)
+    union = update_log_ratio(SHORTER, OLD, table(), MODEL._replace(union=True))
+    assert union - printed == pytest.approx(left)
+    assert update_log_ratio(OLD, SHORTER, table(), MODEL._replace(union=True)) == pytest.approx(-union)
+
+
+@pytest.mark.parametrize(
+    ("equation", "released", "taken"), [(8, GROUND, GROUND), (9, TREE, GROUND), (10, GROUND, TREE), (11, TREE, TREE)]
+)
+def test_equations_8_to_11(equation, released, taken):
+    points = {**Z, (3, 6): 1.0}
+    # log N(6) is -0.22579 in the building, -18.91894 on the ground and -2.11209 in trees; log N(5) -2.22579, -13.41894
+    # and -1.73709; log N(1) -50.22579, -1.41894 and -2.73709. Two cells to the right: columns 2 and 3 are left
+    # (6, 6, 6, 5), the point of 1 m in column 6 is taken in.
+    left = (log_normal(6, *CLASSES[released]) - log_normal(6, 6, 0.5)) * 3
+    left += log_normal(5, *CLASSES[released]) - log_normal(5, 6, 0.5)
+    gained = log_normal(1, 6, 0.5) - log_normal(1, *CLASSES[taken])
+    shares = matching_share(sums(5, 6, 6, 6, 1), 6.0, 0.5, 2.0) - matching_share(sums(*Z.values()), 6.0, 0.5, 2.0)
+    found = centre_log_ratio(SHIFTED, OLD, released, taken, table(points), MODEL)
+    assert found == pytest.approx(left + gained + shares, abs=1e-9)
+    by_hand = {8: -116.07944, 9: -53.97703, 10: -114.76129, 11: -52.65888}
+    assert left + gained == pytest.approx(by_hand[equation], abs=1e-4)
+
+
+def test_equations_12_to_15():
+    # Eight points: -5.80633 under N(6, 0.5), 6 * (-18.91894) + 2 * (-13.41894) under the ground, -16.27182 under trees.
+    own = 6 * log_normal(6, 6, 0.5) + 2 * log_normal(5, 6, 0.5)
+    ground = birth_log_ratio(OLD, GROUND, table(), MODEL)
+    tree = birth_log_ratio(OLD, TREE, table(), MODEL)
+    assert ground == pytest.approx(own + 6 * 18.918939 + 2 * 13.418939, abs=1e-4)
+    assert tree == pytest.approx(own + 6 * 2.112086 + 2 * 1.737086, abs=1e-4)
+    # Equation 12 with b = 1/2 and d = 1/2 has the factor lambda b / d = lambda; equation 13 has d = lambda b and none.
+    with_lambda = MODEL._replace(log_birth=math.log(200 * 0.5 / 0.5))
+    assert birth_log_ratio(OLD, TREE, table(), with_lambda) - tree == pytest.approx(math.log(200))
+    assert birth_log_ratio(EMPTY, TREE, table(), MODEL) == -np.inf
+
+
+def test_equation_16_is_the_inverse_of_the_birth_that_would_bring_the_building_back():
+    births = [birth_log_ratio(OLD, other, table(), MODEL) for other in (GROUND, TREE)]
+    assert death_log_ratio(OLD, table(), MODEL) == pytest.approx(-min(births))
+    with_lambda = MODEL._replace(log_birth=1.5)
+    assert death_log_ratio(OLD, table(), with_lambda) == pytest.approx(-min(births) - 1.5)
+
+
+def test_the_posterior_gains_what_a_birth_gains_and_the_prior():
+    births = [birth_log_ratio(SHORTER, other, table(), MODEL) for other in (GROUND, TREE)]
+    assert log_posterior_gain(SHORTER, table(), MODEL) == pytest.approx(min(births) + log_prior(SHORTER, PRIOR))
+
+
+def schedule(**changes):
+    values = {
+        "steps": np.array([1.0, 1.0, 0.1, 0.5, 0.1]),
+        "sides": np.array([1.0, 8.0]),
+        "iterations": 400,
+        "false_alarm_ratio": 0.5,
+        "birth_share": 0.5,
+        "buildings": 1.0,
+        "capacity": 50,
+        "stride": 1,
+    }
+    return PrintedSchedule(**{**values, **changes})
+
+
+def test_the_flow_chart_updates_moves_and_then_tries_a_birth_or_a_death():
+    _, trace = run_printed(table(), MODEL, schedule(), stream([1]))
+    tried = trace[:, PrintedTrace.TRIED : PrintedTrace.ACCEPTED]
+    held = np.concatenate([[1], trace[:-1, PrintedTrace.BUILDINGS]]) > 0
+    np.testing.assert_array_equal(tried[:, Operation.UPDATE], held)
+    np.testing.assert_array_equal(tried[:, Operation.CENTRE], held)
+    np.testing.assert_array_equal(tried[:, Operation.BIRTH] + tried[:, Operation.DEATH], 1)
+    assert 150 < tried[:, Operation.BIRTH].sum() < 250
+    accepted = trace[:, PrintedTrace.ACCEPTED :]
+    change = accepted[:, Operation.BIRTH] - accepted[:, Operation.DEATH]
+    np.testing.assert_array_equal(np.cumsum(change) + 1, trace[:, PrintedTrace.BUILDINGS])
+
+
+def test_the_best_state_has_the_highest_posterior_of_all_that_were_visited():
+    for seed in range(5):
+        best, trace = run_printed(table(), MODEL, schedule(buildings=3.0), stream([seed]))
+        value = sum(log_posterior_gain(building, table(), MODEL) for building in best)
+        value += len(best) * math.log(3.0) - math.lgamma(len(best) + 1)
+        assert -value == pytest.approx(trace[:, PrintedTrace.ENERGY].min(), abs=1e-6)
+
+
+def test_lambda_decides_how_often_births_are_tried_unless_the_share_is_set():
+    few, many = (make_detector(f"mpp-printed[buildings={number}]")._birth_share for number in (1, 99))
+    assert (few, many) == pytest.approx((0.5, 0.01))
+    assert make_detector("mpp-printed[buildings=99,birth_share=0.5]")._birth_share == 0.5
+
+
+EXTENT = (1000.0, 2000.0, 1080.0, 2060.0)
+HALL = shapely.box(1020, 2015, 1040, 2030)
+
+
+def scene(seed=0):
+    """A hall of 8 m on sloping ground, and a tree with several returns a pulse."""
+    rng = np.random.default_rng(seed)
+    n = 6 * 80 * 60
+    x, y = rng.uniform(1000, 1080, n), rng.uniform(2000, 2060, n)
+    h, returns = rng.normal(0, 0.05, n), np.ones(n, np.uint8)
+    h[shapely.contains_xy(HALL, x, y)] += 8.0
+    crown = (x - 1065) ** 2 + (y - 2045) ** 2 < 36
+    h[crown], returns[crown] = rng.uniform(2, 9, crown.sum()), 2
+    grid = Grid.covering(EXTENT, 2.0)
+    dem = Elevation(np.full(grid.shape, 50.0, np.float32), grid)
+    points = PointCloud(x, y, 50.0 + h, return_number=np.ones(n, np.uint8), number_of_returns=returns)
+    return Scene("hall", EXTENT, crs="EPSG:25832", points=points, dem=dem)
+
+
+def run(selection="mpp-printed", seed=0):
+    return make_detector(selection).detect(scene(), np.random.default_rng(seed))
+
+
+def test_the_detector_repeats_its_run_and_covers_the_hall():
+    found = run()
+    assert shapely.to_wkb(found.polygons).tolist() == shapely.to_wkb(run().polygons).tolist()
+    assert found.crs == "EPSG:25832"
+    assert shapely.intersection(shapely.union_all(found.polygons), HALL).area > 0.5 * HALL.area
+    assert json.loads(json.dumps(found.metadata)) == found.metadata
+
+
+def test_class_gaussians_are_estimated_unless_they_are_set():
+    record = run().metadata["gaussians"]
+    assert record["ground"] == pytest.approx([50.0, 0.1], abs=0.02)
+    assert record["nu"] == pytest.approx([58.0, 0.1], abs=0.05)
+    assert record["tree"] == pytest.approx([55.5, 2.0], abs=0.5)
+    above = run("mpp-printed[heights=above-ground]").metadata["gaussians"]
+    assert above["nu"][0] == pytest.approx(record["nu"][0] - 50, abs=0.01)
+    given = run("mpp-printed[tree_mean=56,ground_spread=0.5]").metadata["gaussians"]
+    assert (given["tree"][0], given["ground"][1]) == (56.0, 0.5)
+    assert given["tree"][1] == record["tree"][1]
+
+
+def test_points_without_return_numbers_and_scenes_without_objects_have_gaussians():
+    flat = PointCloud(*np.random.default_rng(0).uniform(0, 1, (3, 100)))
+    found = class_gaussians(flat, flat.z, flat.z)
+    assert set(found) == {"ground", "tree", "nu"}
+    assert all(spread >= 0.1 for _, spread in found.values())
+
+
+def test_nothing_is_found_where_there_are_no_points():
+    empty = Scene("empty", EXTENT, points=PointCloud(*np.empty((3, 0))))
+    assert len(make_detector("mpp-printed").detect(empty, np.random.default_rng(0))) == 0
+
+
+def test_the_steps_show_the_convergence_and_the_rectangles_of_the_same_run():
+    steps = list(make_detector("mpp-printed").steps(scene(), np.random.default_rng(0)))
+    assert [step.name for step in steps] == ["convergence", "buildings"]
+    shown = steps[1].panels[0].layers[0].polygons
+    assert shapely.to_wkb(shown).tolist() == shapely.to_wkb(run().polygons).tolist()
