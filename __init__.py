@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from .core.package import HOMES, VERSION
 
 if TYPE_CHECKING:
-    from .benchmark.session import detect, run
+    from .benchmark.session import detect
     from .core.errors import RoofbenchError
     from .core.parameters import execution_option, parameter
     from .detectors.base import Detector
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .evaluators.base import Evaluation, Evaluator, Index
     from .evaluators.comparison import evaluate, pool
     from .evaluators.registry import make_evaluator
+    from .reports.board import run
     from .scenes.folder import open_scene, save_scene
     from .scenes.geodata.footprints import Footprints
     from .scenes.geodata.points import PointCloud

@@ -15,10 +15,10 @@ from .identity.keys import source_closure
 from .identity.recipes import PluginRecipe, SceneRecipe, code_digest, label_of
 from .store.records import RunIdentity, RunRow, evaluation_key
 from .store.writer import Store
-from .suite import Entrant, Suite
+from .suite import DetectorEntry, Suite
 
 __all__ = [
-    "Judge",
+    "KeyedEvaluator",
     "Overwrite",
     "Plan",
     "PlannedRun",
@@ -26,6 +26,7 @@ __all__ = [
     "identity_now",
     "make_plan",
     "plan_content",
+    "scene_recipe",
     "suite_from_content",
 ]
 
@@ -34,7 +35,7 @@ Overwrite = Literal["missing", "never", "always"]
 
 
 @dataclass(frozen=True)
-class Judge:
+class KeyedEvaluator:
     """An evaluator with the key of its evaluations in the store."""
 
     evaluator: Evaluator
@@ -42,8 +43,8 @@ class Judge:
     key: str
 
     @classmethod
-    def of(cls, evaluator: Evaluator) -> Judge:
-        """Return the judge of an evaluator."""
+    def of(cls, evaluator: Evaluator) -> KeyedEvaluator:
+        """Return an evaluator with its key."""
         recipe = _recipe(evaluator)
         return cls(evaluator, recipe, evaluation_key(recipe, code_digest(evaluator)))
 
@@ -65,7 +66,7 @@ class PlannedRun:
     Attributes
     ----------
     identity : RunIdentity
-    entrant : Entrant
+    entry : DetectorEntry
     scene : SceneRecipe or Scene
     todo : {"detect", "evaluate", "nothing"}
         ``evaluate``: detections are stored, an evaluation is not.
@@ -73,17 +74,17 @@ class PlannedRun:
         Reason in words.
     stored : int, optional
         Run id where a run of that key is stored.
-    lacking : tuple of Judge
+    lacking : tuple of KeyedEvaluator
         Evaluators whose evaluation is not stored.
     """
 
     identity: RunIdentity
-    entrant: Entrant
+    entry: DetectorEntry
     scene: SceneRecipe | Scene
     todo: Literal["detect", "evaluate", "nothing"]
     why: str
     stored: int | None = None
-    lacking: tuple[Judge, ...] = ()
+    lacking: tuple[KeyedEvaluator, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class Plan:
 
     suite: Suite
     runs: tuple[PlannedRun, ...]
-    judges: tuple[Judge, ...]
+    evaluators: tuple[KeyedEvaluator, ...]
 
     @property
     def keys(self) -> list[str]:
@@ -128,35 +129,35 @@ def make_plan(suite: Suite, store: Store, *, overwrite: Overwrite = "missing", o
     only_failed : bool
         Try failures again and leave everything else alone.
     """
-    judges = tuple(Judge.of(evaluator) for evaluator in suite.evaluators)
-    identities: list[tuple[RunIdentity, Entrant, SceneRecipe | Scene]] = []
+    evaluators = tuple(KeyedEvaluator.of(evaluator) for evaluator in suite.evaluators)
+    identities: list[tuple[RunIdentity, DetectorEntry, SceneRecipe | Scene]] = []
     parts = [
-        (entrant, _recipe(entrant.detector), source_closure(type(entrant.detector)), entrant.detector.fingerprint())
-        for entrant in suite.entrants
+        (entry, _recipe(entry.detector), source_closure(type(entry.detector)), entry.detector.fingerprint())
+        for entry in suite.detectors
     ]
     for scene in suite.scenes:
         recipe = scene_recipe(scene)
         key = recipe.key
-        for entrant, detector, code, fingerprint in parts:
-            for seed in entrant.seeds:
+        for entry, detector, code, fingerprint in parts:
+            for seed in entry.seeds:
                 identity = RunIdentity(
                     detector=detector,
-                    label=entrant.label,
+                    label=entry.label,
                     fingerprint=fingerprint,
                     code=code,
                     scene=recipe,
                     scene_key=key,
                     seed=seed,
                 )
-                identities.append((identity, entrant, scene))
-    unique = {identity.key: (identity, entrant, scene) for identity, entrant, scene in identities}
+                identities.append((identity, entry, scene))
+    unique = {identity.key: (identity, entry, scene) for identity, entry, scene in identities}
     stored = store.statuses(unique)
     good = [run_id for run_id, status, _ in stored.values() if status == "ok"]
-    evaluated = {judge.key: store.evaluated(good, judge.key) for judge in judges}
+    evaluated = {keyed.key: store.evaluated(good, keyed.key) for keyed in evaluators}
     runs = []
-    for key, (identity, entrant, scene) in unique.items():
+    for key, (identity, entry, scene) in unique.items():
         run_id, status, reason = stored.get(key, (None, None, ""))
-        lacking: tuple[Judge, ...] = ()
+        lacking: tuple[KeyedEvaluator, ...] = ()
         todo: Literal["detect", "evaluate", "nothing"] = "nothing"
         if status is None:
             todo, why = "detect", _why_new(store, identity)
@@ -170,18 +171,16 @@ def make_plan(suite: Suite, store: Store, *, overwrite: Overwrite = "missing", o
             why = f"skipped: {reason}"
         else:
             why = f"stored as run {run_id}"
-            lacking = tuple(judge for judge in judges if run_id not in evaluated[judge.key])
+            lacking = tuple(keyed for keyed in evaluators if run_id not in evaluated[keyed.key])
             if lacking:
                 todo = "evaluate"
-                why += ", not yet judged by " + ", ".join(judge.label for judge in lacking)
+                why += ", not yet evaluated by " + ", ".join(keyed.label for keyed in lacking)
         if only_failed and status != "failed":
             todo = "nothing"
         runs.append(
-            PlannedRun(
-                identity=identity, entrant=entrant, scene=scene, todo=todo, why=why, stored=run_id, lacking=lacking
-            )
+            PlannedRun(identity=identity, entry=entry, scene=scene, todo=todo, why=why, stored=run_id, lacking=lacking)
         )
-    return Plan(suite, tuple(runs), judges)
+    return Plan(suite, tuple(runs), evaluators)
 
 
 def _why_new(store: Store, identity: RunIdentity) -> str:
@@ -244,8 +243,7 @@ def plan_content(suite: Suite) -> dict[str, Any]:
         "name": suite.name,
         "scenes": [scene_recipe(scene).to_dict() for scene in suite.scenes],
         "detectors": [
-            {**_recipe(entrant.detector).to_dict(execution=True), "seeds": list(entrant.seeds)}
-            for entrant in suite.entrants
+            {**_recipe(entry.detector).to_dict(execution=True), "seeds": list(entry.seeds)} for entry in suite.detectors
         ],
         "evaluators": [_recipe(evaluator).to_dict(execution=True) for evaluator in suite.evaluators],
     }
@@ -253,8 +251,8 @@ def plan_content(suite: Suite) -> dict[str, Any]:
 
 def suite_from_content(content: Mapping[str, Any]) -> Suite:
     """Return the suite that `plan_content` wrote down."""
-    entrants: Sequence[Entrant] = [
-        Entrant(
+    detectors: Sequence[DetectorEntry] = [
+        DetectorEntry(
             PluginRecipe(item["use"], item["parameters"], item.get("execution", {})).detector(), tuple(item["seeds"])
         )
         for item in content["detectors"]
@@ -262,6 +260,6 @@ def suite_from_content(content: Mapping[str, Any]) -> Suite:
     return Suite(
         content["name"],
         tuple(SceneRecipe.from_dict(recipe) for recipe in content["scenes"]),
-        tuple(entrants),
+        tuple(detectors),
         tuple(PluginRecipe(**recipe).evaluator() for recipe in content["evaluators"]),
     )

@@ -11,17 +11,17 @@ from ..detectors.base import Detector
 from ..detectors.registry import make_detector
 from ..evaluators.base import Evaluator
 from ..evaluators.registry import make_evaluator
-from ..reports.tables import Leaderboard
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
 from .analysis.leaderboard import make_leaderboard
+from .analysis.results import Leaderboard
 from .execution.isolation import Limits
 from .execution.runner import Execution, run_plan
 from .execution.worker import detect as _detect
 from .identity.recipes import SceneRecipe
 from .plan import Overwrite, make_plan
 from .store.writer import Store
-from .suite import Entrant, Suite, scenes_of
+from .suite import DetectorEntry, Suite, scenes_of
 
 __all__ = ["detect", "run"]
 
@@ -90,7 +90,7 @@ def run(
     suite = Suite(
         "run",
         tuple(recipes),
-        tuple(Entrant(make_detector(detector), numbers) for detector in detectors),
+        tuple(DetectorEntry(make_detector(detector), numbers) for detector in detectors),
         (make_evaluator(evaluator),),
     )
     with tempfile.TemporaryDirectory(prefix="roofbench-") as folder:
@@ -99,4 +99,4 @@ def run(
             plan = make_plan(suite, opened, overwrite=overwrite)
             execution = Execution(jobs=jobs, limits=limits or Limits())
             result = run_plan(plan, opened, execution=execution, overwrite=overwrite)
-            return make_leaderboard(result.rows, opened, plan.judges[0], title="Leaderboard", rank_by=rank_by)
+            return make_leaderboard(result.rows, opened, plan.evaluators[0], title="Leaderboard", rank_by=rank_by)

@@ -6,7 +6,7 @@ suite
     Named scenes, detectors and evaluators; every detector runs on every scene.
 scene entry
     A folder (``path``), or a preset of the generator with ``seeds`` and parameters, of which a list is a sweep axis.
-entrant
+entry
     A detector with parameters and the seeds of its random streams.
 """
 
@@ -30,7 +30,15 @@ from ..evaluators.registry import make_evaluator
 from ..scenes.scene import Scene
 from .identity.recipes import SceneRecipe, label_of, preset_names
 
-__all__ = ["Entrant", "Suite", "named_suite", "read_suite", "scenes_of", "suite_names", "suite_of_words"]
+__all__ = [
+    "DetectorEntry",
+    "Suite",
+    "named_suite",
+    "read_suite",
+    "scenes_of",
+    "suite_names",
+    "suite_of_words",
+]
 
 _TABLES = ("scenes", "detectors", "evaluators")
 _DEFAULT_EVALUATOR = "threshold-free"
@@ -38,7 +46,7 @@ _MAX_AXIS = 10_000
 
 
 @dataclass(frozen=True)
-class Entrant:
+class DetectorEntry:
     """A detector and the seeds it runs with on every scene."""
 
     detector: Detector
@@ -63,13 +71,13 @@ class Suite:
     name : str
     scenes : tuple of SceneRecipe or Scene
         Scene objects stay in this process or are spooled for workers.
-    entrants : tuple of Entrant
+    detectors : tuple of DetectorEntry
     evaluators : tuple of Evaluator
     """
 
     name: str
     scenes: tuple[SceneRecipe | Scene, ...]
-    entrants: tuple[Entrant, ...]
+    detectors: tuple[DetectorEntry, ...]
     evaluators: tuple[Evaluator, ...]
 
     def with_scenes(self, pattern: str) -> Suite:
@@ -185,24 +193,24 @@ def suite_of_words(
     else:
         suite = Suite("scenes", scenes_of(words), (), (make_evaluator(_DEFAULT_EVALUATOR),))
         if not detectors:
-            suite = replace(suite, entrants=all_entrants())
+            suite = replace(suite, detectors=all_detectors())
     if detectors:
         numbers = tuple(range(seeds))
-        suite = replace(suite, entrants=tuple(Entrant(make_detector(name), numbers) for name in detectors))
+        suite = replace(suite, detectors=tuple(DetectorEntry(make_detector(name), numbers) for name in detectors))
     if evaluators:
         suite = replace(suite, evaluators=tuple(make_evaluator(name) for name in evaluators))
     return suite
 
 
-def all_entrants() -> tuple[Entrant, ...]:
+def all_detectors() -> tuple[DetectorEntry, ...]:
     """Return every registered detector that needs no parameter of its own to run, with default parameters."""
-    entrants = []
+    detectors = []
     for name in DETECTORS.names():
         try:
-            entrants.append(Entrant(make_detector(name)))
+            detectors.append(DetectorEntry(make_detector(name)))
         except (ParameterError, ModuleNotFoundError):
             continue  # one that wraps a program or a file, or is not installed in full, is run when it is asked for
-    return tuple(entrants)
+    return tuple(detectors)
 
 
 def _number(text: str) -> Any:
@@ -273,12 +281,12 @@ def _parse(text: str, *, source: str, folder: Path, default_name: str) -> Suite:
             scenes[recipe.name] = recipe
     if not scenes:
         raise places.error("a suite needs at least one [[scenes]]")
-    entrants = [_entrant(entry, folder, places, n) for n, entry in enumerate(content.get("detectors", []))]
+    detectors = [_detector_entry(entry, folder, places, n) for n, entry in enumerate(content.get("detectors", []))]
     evaluators = [_evaluator(entry, folder, places, n) for n, entry in enumerate(content.get("evaluators", []))]
     return Suite(
         name,
         tuple(scenes.values()),
-        tuple(entrants) or all_entrants(),
+        tuple(detectors) or all_detectors(),
         tuple(evaluators) or (make_evaluator(_DEFAULT_EVALUATOR),),
     )
 
@@ -316,14 +324,14 @@ def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number
                 raise places.error(str(error), "scenes", number, _named_key(error, parameters)) from error
 
 
-def _entrant(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> Entrant:
+def _detector_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> DetectorEntry:
     use, values = _use(entry, folder, places, "detectors", number)
     seeds = values.pop("seeds", [0])
     try:
         detector = make_detector(use, values)
     except RoofbenchError as error:
         raise places.error(str(error), "detectors", number, _named_key(error, values) or "use") from error
-    return Entrant(detector, _seeds(seeds, first=0, places=places, table="detectors", number=number))
+    return DetectorEntry(detector, _seeds(seeds, first=0, places=places, table="detectors", number=number))
 
 
 def _evaluator(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> Evaluator:

@@ -32,8 +32,8 @@ def export(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Write a stored run as vector layers: detections and references with their verdicts."""
-    from ..benchmark.store.stored_verdicts import export_run
     from ..benchmark.store.writer import Store
+    from ..reports.run_export import export_run
 
     with Store(store, must_exist=True) as opened:
         what = export_run(opened, opened.run(run).id, output, evaluator=evaluator, overwrite=overwrite)

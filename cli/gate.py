@@ -16,7 +16,7 @@ from .options import FORMAT_HELP, DetectorOption, IndicesOption, OverwriteOption
 
 if TYPE_CHECKING:
     from ..benchmark.analysis.baseline import Baseline
-    from ..benchmark.suite import Entrant
+    from ..benchmark.suite import DetectorEntry
 
 __all__ = ["gate"]
 
@@ -84,6 +84,7 @@ def gate(
     from ..benchmark.analysis.timing import time_side_by_side
     from ..benchmark.suite import suite_of_words
     from ..core.output import check_target, whole_file
+    from ..reports.gate_json import gate_json
     from ..reports.gate_text import format_gate
 
     if output is not None:
@@ -93,8 +94,8 @@ def gate(
         before = before.with_scenes(scenes)
     if against is not None:
         before = before.only([against])
-    judge = before.evaluator.evaluator()
-    indices = gated_indices(judge, index)
+    chosen_evaluator = before.evaluator.evaluator()
+    indices = gated_indices(chosen_evaluator, index)
     margins = margins_of(margin or [], indices)
     if candidate is not None:
         if suite is not None or detector or time:
@@ -103,10 +104,10 @@ def gate(
         after = after if scenes is None else after.with_scenes(scenes)
     else:
         if detector:
-            before, entrants = _named(before, detector)
+            before, entries = _named(before, detector)
         else:
-            entrants = before.to_suite().entrants
-        chosen = replace(before.to_suite(), entrants=entrants)
+            entries = before.to_suite().detectors
+        chosen = replace(before.to_suite(), detectors=entries)
         if suite is not None:
             chosen = replace(chosen, scenes=suite_of_words([suite], None, None).scenes)
             chosen = chosen if scenes is None else chosen.with_scenes(scenes)
@@ -122,16 +123,16 @@ def gate(
     if output is not None:
         with whole_file(output, overwrite=overwrite) as scratch:
             scratch.write_text(format_gate(result, "md") + "\n", encoding="utf-8")
-    typer.echo(format_gate(result, form))
+    typer.echo(gate_json(result) if form == "json" else format_gate(result, form))
     raise typer.Exit(result.exit_code)
 
 
-def _named(before: Baseline, selections: list[str]) -> tuple[Baseline, tuple[Entrant, ...]]:
+def _named(before: Baseline, selections: list[str]) -> tuple[Baseline, tuple[DetectorEntry, ...]]:
     """Return what the baseline has of the detectors that are named, and those to be run, with its seeds."""
-    from ..benchmark.suite import Entrant
+    from ..benchmark.suite import DetectorEntry
     from ..detectors.registry import make_detector
 
-    detectors = {entrant.label: entrant.detector for entrant in (Entrant(make_detector(name)) for name in selections)}
+    detectors = {entry.label: entry.detector for entry in (DetectorEntry(make_detector(name)) for name in selections)}
     known = before.counterparts(list(detectors))
     for label in detectors:
         if label not in known:
@@ -139,5 +140,5 @@ def _named(before: Baseline, selections: list[str]) -> tuple[Baseline, tuple[Ent
                 f"the baseline has no detector {label!r}; it has {', '.join(before.detectors)}: name the one "
                 "to compare it with by against="
             )
-    entrants = (Entrant(detector, before.detectors[known[label]].seeds) for label, detector in detectors.items())
-    return before.only(known.values()), tuple(entrants)
+    entries = (DetectorEntry(detector, before.detectors[known[label]].seeds) for label, detector in detectors.items())
+    return before.only(known.values()), tuple(entries)

@@ -65,7 +65,7 @@ def plot_scene(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Plot the verdicts of detectors on a scene, side by side."""
-    from ..benchmark.analysis.report_contents import newest_runs, stored_judges
+    from ..benchmark.analysis.report_contents import newest_runs, stored_evaluators
     from ..benchmark.analysis.report_scenes import scene_view
     from ..benchmark.store.writer import Store
     from ..reports.figures import save_plot
@@ -78,10 +78,10 @@ def plot_scene(
         if len(names) != 1:
             found = f"several scenes match {name!r}: {', '.join(list(names)[:8])}" if names else f"no run on {name!r}"
             raise UnknownNameError(f"{store}: {found}; 'roofbench ls' lists what there is")
-        judges = stored_judges(opened, rows)
+        evaluators = stored_evaluators(opened, rows)
         first = {row.label: row for row in sorted(rows, key=lambda row: -row.seed)}
         chosen = [row for row in rows if first[row.label] is row]
-        view = scene_view(opened, opened.scene(rows[0].scene_id), chosen, judges[0].key) if judges else None
+        view = scene_view(opened, opened.scene(rows[0].scene_id), chosen, evaluators[0].key) if evaluators else None
     if view is None:
         raise ParameterError(f"{store}: {name!r} has no verdicts to draw: it has no reference, or was not evaluated")
     save_plot(overlay_figure(view, window=_placed(window, view.extent)), output, dpi=dpi, overwrite=overwrite)

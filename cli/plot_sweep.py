@@ -42,7 +42,7 @@ def plot_sweep(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Plot quality along swept parameters and generator axes, with intervals and break-down points."""
-    from ..benchmark.analysis.report_contents import newest_runs, stored_judges
+    from ..benchmark.analysis.report_contents import newest_runs, stored_evaluators
     from ..benchmark.analysis.sensitivity import read_sweep_table, stored_sensitivities
     from ..benchmark.store.writer import Store
     from ..reports.figures import save_plot
@@ -54,9 +54,11 @@ def plot_sweep(
     else:
         with Store(store, must_exist=True) as opened:
             rows = [row for row in newest_runs(opened) if row.status == "ok"]
-            judges = stored_judges(opened, rows)
-            values = opened.index_values([row.id for row in rows], judges[0].key) if judges else {}
-            lines = stored_sensitivities(rows, values, judges[0], level=level, chosen=index or ()) if judges else []
+            evaluators = stored_evaluators(opened, rows)
+            values = opened.index_values([row.id for row in rows], evaluators[0].key) if evaluators else {}
+            lines = (
+                stored_sensitivities(rows, values, evaluators[0], level=level, chosen=index or ()) if evaluators else []
+            )
     known = dict.fromkeys(line.axis for line in lines)
     if axis:
         missing = [name for name in axis if name not in known]

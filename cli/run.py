@@ -65,14 +65,14 @@ def run(
 
     Exit code 3 when runs failed, 4 when nothing could be measured.
     """
-    from ..benchmark.analysis.leaderboard import incidents_of, make_leaderboard, rank_index
+    from ..benchmark.analysis.leaderboard import make_leaderboard, rank_index, unsuccessful_runs
     from ..benchmark.analysis.report_contents import fill_report
     from ..benchmark.execution.runner import run_plan
     from ..benchmark.plan import make_plan, plan_content, suite_from_content
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
     from ..reports.html_report import write_report
-    from ..reports.tables import print_incidents, write_leaderboards
+    from ..reports.leaderboard_text import print_leaderboard, print_unsuccessful, write_leaderboards
 
     execution = options.execution()
     if resume and words:
@@ -99,8 +99,8 @@ def run(
         with run_progress(plan, console, verbose=options.verbose) as report:
             result = run_plan(plan, opened, execution=execution, overwrite=rerun, progress=report)
         boards = [
-            make_leaderboard(result.rows, opened, judge, title=f"Suite {suite.name}", rank_by=index)
-            for judge in plan.judges
+            make_leaderboard(result.rows, opened, keyed, title=f"Suite {suite.name}", rank_by=index)
+            for keyed in plan.evaluators
         ]
         known = len(result.rows) - result.done
         console.print(
@@ -110,14 +110,14 @@ def run(
         if output is not None:
             write_leaderboards(output, boards)
             if any(entry.scenes for board in boards for entry in board.entries):
-                judged = list(zip(plan.judges, boards, strict=True))
-                filled = fill_report(opened, result.rows, title=f"Suite {suite.name}", judged=judged)
+                evaluated = list(zip(plan.evaluators, boards, strict=True))
+                filled = fill_report(opened, result.rows, title=f"Suite {suite.name}", evaluated=evaluated)
                 write_report(filled, output / "report.html", overwrite=True)
         for number, board in enumerate(boards):
             if number:
                 typer.echo()
-            board.print(table_console())
-        print_incidents(incidents_of(result.rows), console)
+            print_leaderboard(board, table_console())
+        print_unsuccessful(unsuccessful_runs(result.rows), console)
         if result.failed:
             raise typer.Exit(3)
         if not any(entry.scenes for board in boards for entry in board.entries):

@@ -34,22 +34,23 @@ def score(
     """Evaluate stored detections with other evaluators and print their leaderboards; no detector runs again."""
     from ..benchmark.analysis.leaderboard import make_leaderboard
     from ..benchmark.execution.runner import score_stored
-    from ..benchmark.plan import Judge
+    from ..benchmark.plan import KeyedEvaluator
     from ..benchmark.store.writer import Store
     from ..evaluators.registry import make_evaluator
+    from ..reports.leaderboard_text import print_leaderboard
 
     load_plugins(plugin)
-    judges = tuple(Judge.of(make_evaluator(name)) for name in evaluator)
+    evaluators = tuple(KeyedEvaluator.of(make_evaluator(name)) for name in evaluator)
     with Store(store, must_exist=True) as opened:
         rows = opened.runs(detector=detectors, scene=scenes)[::-1]
         good = [row.id for row in rows if row.status == "ok"]
-        for judge in judges:
-            known = opened.evaluated(good, judge.key)
+        for keyed in evaluators:
+            known = opened.evaluated(good, keyed.key)
             for run_id in good:
                 if run_id not in known:
-                    score_stored(opened, run_id, (judge,))
-        for judge in judges:
-            board = make_leaderboard(rows, opened, judge, title=f"Stored runs of {store}", rank_by=index)
-            board.print(table_console())
+                    score_stored(opened, run_id, (keyed,))
+        for keyed in evaluators:
+            board = make_leaderboard(rows, opened, keyed, title=f"Stored runs of {store}", rank_by=index)
+            print_leaderboard(board, table_console())
     if not good:
         raise typer.Exit(4)

@@ -69,13 +69,13 @@ def sweep(
 
     Exit code 3 when runs failed, 4 when nothing could be measured.
     """
-    from ..benchmark.analysis.leaderboard import incidents_of, rank_index
+    from ..benchmark.analysis.leaderboard import rank_index, unsuccessful_runs
     from ..benchmark.analysis.sweep import axis_of, break_downs, make_sweep, run_sweep
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
     from ..core.output import check_target
     from ..core.registry import split_list
-    from ..reports.tables import print_incidents
+    from ..reports.leaderboard_text import print_unsuccessful
 
     execution = options.execution()
     if output is not None:
@@ -101,12 +101,12 @@ def sweep(
         console.print(f"{output}: {len(table)} rows", markup=False)
     _print(table, planned, shown)
     if level is not None:
-        first = table[table["evaluator"] == planned.plan.judges[0].label]
+        first = table[table["evaluator"] == planned.plan.evaluators[0].label]
         for found in break_downs(first, planned.axes, shown, level):
             typer.echo(str(found))
-    incidents = incidents_of(rows)
-    print_incidents(incidents, console)
-    if any(incident.status == "failed" for incident in incidents):
+    unsuccessful = unsuccessful_runs(rows)
+    print_unsuccessful(unsuccessful, console)
+    if any(run.status == "failed" for run in unsuccessful):
         raise typer.Exit(3)
     if not table["scenes"].any():
         raise typer.Exit(4)
@@ -127,30 +127,10 @@ def write_table(table: pd.DataFrame, path: Path, *, overwrite: bool) -> None:
 
 
 def _print(table: pd.DataFrame, planned: Sweep, index: Index) -> None:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
+    from ..reports.sweep_text import sweep_table
 
-    from ..reports.tables import column_title, format_cell
-
-    chosen = table[table["index"] == index.key]
-    names = [axis.name for axis in planned.axes]
-    drawn = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for name in ("detector", *names, column_title(index), "95 %", "scenes", "failed", "skipped"):
-        drawn.add_column(Text(name), justify="left" if name == "detector" else "right", no_wrap=True)
-    for row in chosen.to_dict("records"):
-        values = [_axis_value(row[name]) for name in names]
-        bounds = [format_cell(row[bound], index.unit) for bound in ("low", "high") if row[bound] == row[bound]]
-        mean = format_cell(row["mean"] if row["mean"] == row["mean"] else None, index.unit)
-        counts = [str(row[name]) for name in ("scenes", "failed", "skipped")]
-        drawn.add_row(*map(Text, [row["detector"], *values, mean, "–".join(filter(None, bounds)), *counts]))
+    first = planned.plan.evaluators[0].label
     console = table_console()
-    console.print(drawn)
-    judge = planned.plan.judges[0].label
-    console.print(Text(f"mean of {index.title} over scenes, {judge}, with its bootstrap interval"))
-
-
-def _axis_value(value: object) -> str:
-    if value is None or value != value:
-        return ""
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    text = sweep_table(table[table["evaluator"] == first], [axis.name for axis in planned.axes], index)
+    console.print(text.to_text(console.width), markup=False, soft_wrap=True)
+    console.print(f"mean of {index.title} over scenes, {first}, with its bootstrap interval", markup=False)

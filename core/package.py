@@ -39,7 +39,7 @@ HOMES = {
     "parameter": "core.parameters",
     "pool": "evaluators.comparison",
     "read_footprints": "scenes.geodata.vector_files",
-    "run": "benchmark.session",
+    "run": "reports.board",
     "save_scene": "scenes.folder",
     "write_footprints": "scenes.geodata.vector_files",
 }

@@ -21,7 +21,7 @@ from typing import Any, Self
 from .errors import ParameterError
 from .registry import nearest_hint
 
-__all__ = ["Parameter", "Parameterised", "execution_option", "parameter"]
+__all__ = ["Parameter", "Parameterised", "execution_option", "parameter", "parameter_text"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -179,6 +179,15 @@ def execution_option(
     """
     facts = {"unit": unit, "minimum": minimum, "maximum": maximum, "choices": choices, "doc": doc}
     return dataclasses.field(default=default, compare=False, metadata={"execution": facts})
+
+
+def parameter_text(value: Any) -> str:
+    """Return the value of a parameter as labels and tables write it.
+
+    >>> parameter_text(0.25), parameter_text(3.0), parameter_text("exact")
+    ('0.25', '3', 'exact')
+    """
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 class Parameterised:

@@ -13,8 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from .inline_svg import FAINT, INK, SERIES, new_figure, shortened, style_axes
-from .report_data import CostPoint, SizeBin, SizeCurve
+from ..benchmark.analysis.report_data import CostPoint, SizeBin, SizeCurve
+from .format import shortened
+from .inline_svg import FAINT, INK, SERIES, new_figure, style_axes
 
 __all__ = ["cost_figure", "legend_below", "size_figure", "wilson"]
 

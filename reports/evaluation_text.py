@@ -5,52 +5,49 @@ Fractions are printed as percent; an undefined index (0/0) as a dash in tables a
 
 from __future__ import annotations
 
-import csv
-import io
 import json
+from collections.abc import Iterable
+from typing import Literal
 
 from ..evaluators.base import Evaluation, Index
+from .format import value_text
+from .tables import Column, Table, escaped_markdown
 
-__all__ = ["FORMATS", "described", "format_evaluation", "format_value"]
-
-FORMATS = ("table", "json", "csv", "md")
-
-
-def format_value(value: float | None, unit: str) -> str:
-    """Return a value with its unit: ``93.1 %``, ``1.92 m``; a dash where it is undefined."""
-    if value is None:
-        return "–"
-    if unit == "fraction":
-        return f"{100 * value:.2f} %"
-    if unit == "count":
-        return f"{value:,.0f}"
-    return f"{value:.3f} {unit}".removesuffix(" ratio")
+__all__ = ["described", "evaluation_table", "format_evaluation"]
 
 
-def format_evaluation(evaluation: Evaluation, form: str, *, title: str = "") -> str:
+def format_evaluation(evaluation: Evaluation, form: Literal["table", "json", "csv", "md"], *, title: str = "") -> str:
     """Return the evaluation as ``table``, ``json``, ``csv`` or ``md`` (Markdown)."""
     if form == "json":
         return json.dumps(evaluation.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
     indices = evaluation.evaluator.indices
     if form == "csv":
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["key", "index", "symbol", "value", "unit"])
-        for index in indices:
-            value = evaluation.values[index.key]
-            writer.writerow([index.key, index.title, index.symbol, "" if value is None else repr(value), index.unit])
-        return text.getvalue().rstrip("\n")
+        data = ((i.key, i.title, i.symbol, evaluation.values[i.key], i.unit) for i in indices)
+        columns = map(Column, ("key", "index", "symbol", "value", "unit"))
+        return Table.of(columns, data).to_csv().rstrip("\n")
     markdown = form == "md"
-    lines = [f"### {title}" if markdown else title] if title else []
+
+    def written(chosen: Iterable[Index]) -> str:
+        table = evaluation_table(evaluation, chosen)
+        return table.to_markdown() if markdown else table.to_text()
+
+    lines = [f"### {escaped_markdown(title)}" if markdown else title] if title else []
     lines += [_counts_line(evaluation), "", described(evaluation), ""]
-    lines += _table([index for index in indices if index.main], evaluation, markdown)
+    lines.append(written(index for index in indices if index.main))
     variants = [index for index in indices if not index.main and evaluation.values[index.key] is not None]
     if variants:
-        lines += ["", "Variants", ""]
-        lines += _table(variants, evaluation, markdown)
+        lines += ["", "Variants", "", written(variants)]
     lines += [""] if evaluation.notes else []
-    lines += [f"{'- ' if markdown else 'Note: '}{note}" for note in evaluation.notes]
+    lines += [f"- {escaped_markdown(note)}" if markdown else f"Note: {note}" for note in evaluation.notes]
     return "\n".join(lines)
+
+
+def evaluation_table(evaluation: Evaluation, indices: Iterable[Index]) -> Table:
+    """Return one row per index: title, symbol and value with its unit."""
+    return Table.of(
+        (Column("index", "left"), Column("symbol", "left"), Column("value")),
+        ((i.title, i.symbol, value_text(evaluation.values[i.key], i.unit, fine=True)) for i in indices),
+    )
 
 
 def described(evaluation: Evaluation) -> str:
@@ -63,16 +60,3 @@ def _counts_line(evaluation: Evaluation) -> str:
     """Return the objects behind the figures."""
     counts = {key: int(value) for key, value in evaluation.tallies.items() if key.startswith("counts.")}
     return " · ".join(f"{value:,} {key.removeprefix('counts.').replace('_', ' ')}" for key, value in counts.items())
-
-
-def _table(indices: list[Index], evaluation: Evaluation, markdown: bool) -> list[str]:
-    rows = [(index.title, index.symbol, format_value(evaluation.values[index.key], index.unit)) for index in indices]
-    heads = ("index", "symbol", "value")
-    widths = [max(len(row[column]) for row in [heads, *rows]) for column in range(3)]
-    cells = [[heads[0].ljust(widths[0]), heads[1].ljust(widths[1]), heads[2].rjust(widths[2])]]
-    cells += [[row[0].ljust(widths[0]), row[1].ljust(widths[1]), row[2].rjust(widths[2])] for row in rows]
-    rule = ["-" * widths[0], "-" * widths[1], "-" * (widths[2] - 1) + (":" if markdown else "-")]
-    cells.insert(1, rule)
-    if markdown:
-        return [f"| {' | '.join(row)} |" for row in cells]
-    return ["  ".join(row).rstrip() for row in cells]

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from .gate_text import GateResult, IndexVerdict
-from .inline_svg import FAINT, INK, new_figure, shortened, style_axes
+from ..benchmark.analysis.results import GateResult, IndexConclusion
+from .format import shortened
+from .inline_svg import FAINT, INK, new_figure, style_axes
 
 __all__ = ["gate_figure"]
 
-#: Verdict to (colour, marker).
+#: Conclusion to (colour, marker).
 _STYLE = {
     "better": ("#009E73", "^"),
     "worse": ("#D55E00", "v"),
@@ -23,7 +24,7 @@ _STYLE = {
 
 def gate_figure(result: GateResult) -> Figure:
     """Return a panel per detector: a line per index, differences in units of its margin, positive is better."""
-    detectors = list(dict.fromkeys(verdict.detector for verdict in result.verdicts))
+    detectors = list(dict.fromkeys(found.detector for found in result.conclusions))
     most = max((len(_of(result, detector)) for detector in detectors), default=1)
     columns = min(2, max(len(detectors), 1))
     rows = -(-max(len(detectors), 1) // columns)
@@ -33,26 +34,24 @@ def gate_figure(result: GateResult) -> Figure:
         axes.set_visible(False)
     for axes, detector in zip(grid.flat, detectors, strict=False):
         style_axes(axes)
-        mine = _of(result, detector)
-        n = sorted({verdict.scenes for verdict in mine})
+        own = _of(result, detector)
+        n = sorted({found.scenes for found in own})
         span = f"{n[0]}" if len(n) == 1 else f"{n[0]}–{n[-1]}"
         axes.set_title(f"{shortened(detector)}: n = {span} paired scenes", loc="left", fontsize=10)
         axes.axvspan(-1, 1, color=FAINT, alpha=0.45, linewidth=0)
         axes.axvline(0, color=INK, linewidth=0.8)
-        for place, verdict in enumerate(mine):
-            colour, marker = _STYLE[verdict.verdict]
-            unit = verdict.margin or 1.0
-            if verdict.low is not None and verdict.high is not None:
-                axes.plot(
-                    [verdict.low / unit, verdict.high / unit], [place, place], color=colour, linewidth=2, alpha=0.6
-                )
-            if verdict.effect is not None:
-                axes.plot(verdict.effect / unit, place, marker=marker, color=colour, markersize=6.5, linestyle="none")
-        axes.set_yticks(range(len(mine)), [f"{verdict.index.title}: {verdict.verdict}" for verdict in mine])
-        axes.set_ylim(len(mine) - 0.4, -0.6)
+        for place, found in enumerate(own):
+            colour, marker = _STYLE[found.conclusion]
+            unit = found.margin or 1.0
+            if found.low is not None and found.high is not None:
+                axes.plot([found.low / unit, found.high / unit], [place, place], color=colour, linewidth=2, alpha=0.6)
+            if found.effect is not None:
+                axes.plot(found.effect / unit, place, marker=marker, color=colour, markersize=6.5, linestyle="none")
+        axes.set_yticks(range(len(own)), [f"{found.index.title}: {found.conclusion}" for found in own])
+        axes.set_ylim(len(own) - 0.4, -0.6)
         axes.set_xlabel("mean paired difference in margins\n(positive is better; bars: 95 %)")
     return figure
 
 
-def _of(result: GateResult, detector: str) -> Sequence[IndexVerdict]:
-    return [verdict for verdict in result.verdicts if verdict.detector == detector]
+def _of(result: GateResult, detector: str) -> Sequence[IndexConclusion]:
+    return [found for found in result.conclusions if found.detector == detector]

@@ -1,20 +1,35 @@
-"""Reading a gate's result back from the JSON that ``roofbench gate --format json`` prints."""
+"""The gate's result as JSON, written by ``roofbench gate --format json`` and read back for reports and figures."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ..benchmark.analysis.results import CONCLUSIONS, GateResult, IndexConclusion
 from ..core.errors import InputError
 from ..evaluators.base import Index
 from ..evaluators.registry import EVALUATORS
-from .gate_text import GateResult, IndexVerdict
+from .gate_text import gate_summary
 
-__all__ = ["read_gate"]
+__all__ = ["gate_json", "read_gate"]
 
 _NUMBERS = ("baseline", "candidate", "effect", "low", "high", "p")
-_WORDS = ("better", "worse", "equal", "undecided", "not measurable")
+
+
+def gate_json(result: GateResult) -> str:
+    """Return the result as JSON; indices are written as their keys."""
+    content = {
+        "baseline": result.baseline,
+        "candidate": result.candidate,
+        "level": result.level,
+        "summary": gate_summary(result),
+        "exit_code": result.exit_code,
+        "conclusions": [{**asdict(found), "index": found.index.key} for found in result.conclusions],
+        "failures": list(result.failures),
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def read_gate(path: Path) -> GateResult:
@@ -30,7 +45,7 @@ def read_gate(path: Path) -> GateResult:
         return GateResult(
             baseline=str(content["baseline"]),
             candidate=str(content["candidate"]),
-            verdicts=tuple(_verdict(plain) for plain in content["verdicts"]),
+            conclusions=tuple(_conclusion(plain) for plain in content["conclusions"]),
             failures=tuple(map(str, content["failures"])),
             level=float(content["level"]),
         )
@@ -39,17 +54,17 @@ def read_gate(path: Path) -> GateResult:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         missing = f"it has no {error}" if isinstance(error, KeyError) else str(error)
         raise InputError(
-            f"{path}: no result of the gate ({missing}): 'roofbench gate BASELINE --format json' prints one"
+            f"{path}: not a result of the gate ({missing}): 'roofbench gate BASELINE --format json' prints one"
         ) from error
 
 
-def _verdict(plain: dict[str, Any]) -> IndexVerdict:
-    if plain["verdict"] not in _WORDS:
-        raise ValueError(f"unknown verdict {plain['verdict']!r}")
-    return IndexVerdict(
+def _conclusion(plain: dict[str, Any]) -> IndexConclusion:
+    if plain["conclusion"] not in CONCLUSIONS:
+        raise ValueError(f"unknown conclusion {plain['conclusion']!r}")
+    return IndexConclusion(
         detector=str(plain["detector"]),
         index=_index(str(plain["index"])),
-        verdict=plain["verdict"],
+        conclusion=plain["conclusion"],
         margin=float(plain["margin"]),
         scenes=int(plain["scenes"]),
         note=str(plain.get("note", "")),
@@ -58,7 +73,7 @@ def _verdict(plain: dict[str, Any]) -> IndexVerdict:
 
 
 def _index(key: str) -> Index:
-    """Return the index of that key; one of a plugin that is not here by its key alone."""
+    """Return the index of a key; one of a plugin that is not loaded has its key alone."""
     for name in EVALUATORS.names():
         indices: tuple[Index, ...] = EVALUATORS.get(name).indices
         for index in indices:

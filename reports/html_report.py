@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from itertools import groupby
@@ -19,16 +18,19 @@ from typing import Any
 import jinja2
 from markupsafe import Markup, escape
 
+from ..benchmark.analysis.published import Comparison, checks
+from ..benchmark.analysis.report_data import Report
+from ..benchmark.analysis.results import Cell, Entry, Leaderboard
 from ..core.output import whole_file
 from ..core.package import VERSION
 from ..evaluators.base import Index
 from .charts import cost_figure, size_figure
+from .format import counted, interval_text, listed, number_text, shortened, unit_text, value_text
+from .gate_text import gate_summary
 from .inline_svg import to_inline_svg
+from .leaderboard_text import leaderboard_caption
 from .overlay_json import report_json
-from .published import Comparison, checks
-from .report_data import Report
 from .sensitivity import sensitivity_figure
-from .tables import Cell, Entry, Leaderboard, format_cell
 
 __all__ = ["html_report", "write_report"]
 
@@ -65,7 +67,8 @@ def html_report(report: Report, *, level: float = 0.8) -> str:
         data=jinja2.utils.htmlsafe_json_dumps(report_json(report), separators=(",", ":"), allow_nan=False),
         version=VERSION,
         level=level,
-        cell_text=format_cell,
+        cell_text=number_text,
+        gate_summary=gate_summary,
         percent_text=_percent_text,
         subscripted=_subscripted,
         lead=_lead(report),
@@ -76,7 +79,7 @@ def html_report(report: Report, *, level: float = 0.8) -> str:
         charts=_charts(report, level),
         break_downs=[line.break_down for line in report.sensitivities if line.break_down],
         published=_published(report),
-        incidents=report.boards[0].incidents if report.boards else (),
+        unsuccessful=report.boards[0].unsuccessful if report.boards else (),
         contents=_contents(report),
     )
 
@@ -106,7 +109,7 @@ def _contents(report: Report) -> list[tuple[str, str]]:
         ("cost", "Time and memory", report.costs),
         ("gate", "Gate", report.gate),
         ("published", "Published", report.comparison),
-        ("incidents", "Failures", report.boards and report.boards[0].incidents),
+        ("unsuccessful", "Failures", report.boards and report.boards[0].unsuccessful),
         ("provenance", "Provenance", True),
     ]
     return [(place, text) for place, text, shown in there if shown]
@@ -122,16 +125,19 @@ def _lead(report: Report) -> str:
     if not ranked:
         return f"{len(entries)} detectors, none of which has a result on every scene: nothing is ranked."
     best, index = ranked[0], board.rank_by
-    text = f"{_short(best.label)} leads with {_with_unit(best.cells[index.key].value, index)} {index.title}"
     cell = best.cells[index.key]
+    text = f"{_short(best.label)} leads with {value_text(cell.value, index.unit, undefined='no')} {index.title}"
     if cell.low is not None:
-        text += f" (95 % interval {format_cell(cell.low, index.unit)}–{format_cell(cell.high, index.unit)})"
-    text += f" over {_count(len(board.scenes), 'scene')} and {best.reference:,} reference footprints"
+        text += f" (95 % interval {interval_text(cell.low, cell.high, index.unit)})"
+    text += f" over {counted(len(board.scenes), 'scene')} and {best.reference:,} reference footprints"
     same = [_short(entry.label) for entry in ranked[1:] if set(entry.group) & set(best.group)]
     if same:
-        return f"{text}; it cannot be told apart from {_listed(same)}."
-    rest = [f"{_short(entry.label)} {_with_unit(entry.cells[index.key].value, index)}" for entry in ranked[1:4]]
-    return f"{text}{', before ' + _listed(rest) if rest else ''}."
+        return f"{text}; the lead over {listed(same)} is not significant."
+    rest = [
+        f"{_short(entry.label)} {value_text(entry.cells[index.key].value, index.unit, undefined='no')}"
+        for entry in ranked[1:4]
+    ]
+    return f"{text}{', before ' + listed(rest) if rest else ''}."
 
 
 def _tiles(report: Report) -> list[dict[str, Any]]:
@@ -213,7 +219,7 @@ def _board(board: Leaderboard) -> dict[str, Any]:
         "heads": heads,
         "rows": rows,
         "scenes": len(board.scenes),
-        "caption": board.caption(),
+        "caption": leaderboard_caption(board),
         "notes": board.notes,
     }
 
@@ -243,20 +249,16 @@ def _group_of(index: Index) -> str:
 
 
 def _unit(index: Index) -> str:
-    return {"fraction": " %", "ratio": "", "count": ""}.get(index.unit, f" {index.unit}")
-
-
-def _with_unit(value: float | None, index: Index) -> str:
-    return "no" if value is None else f"{format_cell(value, index.unit)}{_unit(index)}"
+    """Return the unit as it follows a number."""
+    sign = unit_text(index.unit)
+    return f" {sign}" if sign else ""
 
 
 def _percent_text(value: float | None, index: Index) -> str:
-    """Return our value in the units of the papers' tables: percent, and metres."""
-    if value is None:
-        return "–"
-    if index.unit in ("fraction", "ratio"):
-        return f"{100 * value:.1f}"
-    return f"{value:.2f} {index.unit}"
+    """Return our value in the units of the papers' tables: percent, also for ratios, and metres."""
+    if value is None or index.unit not in ("fraction", "ratio"):
+        return value_text(value, index.unit)
+    return number_text(value, "fraction")
 
 
 def _subscripted(text: str) -> Markup:
@@ -265,15 +267,7 @@ def _subscripted(text: str) -> Markup:
 
 
 def _short(label: str) -> str:
-    return label if len(label) <= 60 else f"{label[:40]}…"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number:,} {noun}{'s' * (number != 1)}"
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return " and ".join([*([", ".join(parts[:-1])] if len(parts) > 1 else []), parts[-1]])
+    return shortened(label, 60)
 
 
 def _scene_groups(report: Report) -> list[tuple[str, list[tuple[int, str]]]]:

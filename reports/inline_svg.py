@@ -15,7 +15,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-__all__ = ["FAINT", "INK", "SERIES", "new_figure", "shortened", "style_axes", "to_inline_svg"]
+__all__ = ["FAINT", "INK", "SERIES", "new_figure", "style_axes", "to_inline_svg"]
 
 #: Stand-ins that no picture contains by chance.
 INK, FAINT = "#123457", "#cbd5e3"
@@ -54,12 +54,6 @@ def style_axes(axes: Axes) -> None:
     axes.tick_params(colors=INK, labelsize=9, length=3, width=0.7, which="both")
     axes.xaxis.label.set_fontsize(9.5)
     axes.yaxis.label.set_fontsize(9.5)
-
-
-def shortened(text: str, width: int = 42) -> str:
-    """Return text on one line that is at most so wide, with its middle left out."""
-    text = " ".join(text.split())
-    return text if len(text) <= width else f"{text[: width // 2]} … {text[-(width // 2 - 2) :]}"
 
 
 def to_inline_svg(figure: Figure, *, name: str, description: Sequence[str] | str) -> str:

@@ -16,8 +16,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from .report_data import Error, Overlay, Report, SceneView, Side
-from .scene_picture import ScenePicture
+from ..benchmark.analysis.report_data import Error, Overlay, Report, SceneView, Side
+from ..benchmark.execution.scene_picture import ScenePicture
 from .verdict_map import VERDICT_STYLE
 
 __all__ = ["data_uri", "path_data", "report_json"]

@@ -17,10 +17,10 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image as Bitmap
 
-from .inline_svg import shortened
+from ..benchmark.analysis.report_data import Overlay, SceneView, Side
+from ..benchmark.execution.scene_picture import ScenePicture
+from .format import shortened
 from .map_elements import add_scale_bar, polygon_paths
-from .report_data import Overlay, SceneView, Side
-from .scene_picture import ScenePicture
 from .verdict_map import VERDICT_STYLE
 
 __all__ = ["overlay_figure"]

@@ -16,8 +16,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from .inline_svg import INK, SERIES, new_figure, shortened, style_axes
-from .report_data import Sensitivity
+from ..benchmark.analysis.report_data import Sensitivity
+from ..core.parameters import parameter_text
+from .format import shortened
+from .inline_svg import INK, SERIES, new_figure, style_axes
 
 __all__ = ["sensitivity_figure"]
 
@@ -126,11 +128,9 @@ def _label_axis(
     kind = "scene" if name.startswith("scene.") else "detector parameter"
     panel.set_title(kind, loc="left", fontsize=10)
     if len(values) <= 7:
-        panel.set_xticks([places[value] for value in values], [shortened(_shown(value), 14) for value in values])
-
-
-def _shown(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+        panel.set_xticks(
+            [places[value] for value in values], [shortened(parameter_text(value), 14) for value in values]
+        )
 
 
 def _legend(figure: Figure, detectors: Sequence[str], indices: Sequence[str]) -> None:

@@ -17,7 +17,8 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..evaluators.base import Evaluation, Verdicts
-from .evaluation_text import described, format_value
+from .evaluation_text import described, evaluation_table
+from .format import shortened
 from .map_elements import add_scale_bar, polygon_paths
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry
         raise ValueError("a pooled evaluation has no verdicts to draw")
     figure = Figure(figsize=(13, 8), dpi=100, layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=[2.4, 1], squeeze=False)[0]
-    figure.suptitle(_shortened(title, 150), x=0.01, ha="left", fontsize=11, parse_math=False)
+    figure.suptitle(shortened(title, 150), x=0.01, ha="left", fontsize=11, parse_math=False)
     places, total = _places(verdicts)
     columns = math.ceil(math.sqrt(len(places)))
     grid = left.subplots(math.ceil(len(places) / columns), columns, squeeze=False)
@@ -162,10 +163,6 @@ def _places(verdicts: Verdicts) -> tuple[list[tuple[float, float, float, float] 
     return list(extents[:9]), len(extents)
 
 
-def _shortened(text: str, width: int) -> str:
-    return text if len(text) <= width else text[: width // 2] + " … " + text[-width // 2 :]
-
-
 def _draw_group(axes: Axes, polygons: NDArray[np.object_], verdict: str, window: shapely.Geometry) -> Patch:
     colour, hatch, label = VERDICT_STYLE[verdict]
     face = to_rgba(colour, 0.35 if hatch or verdict == "left out" else 0.75)
@@ -179,13 +176,9 @@ def _draw_group(axes: Axes, polygons: NDArray[np.object_], verdict: str, window:
 def _draw_indices(axes: Axes, evaluation: Evaluation) -> None:
     """Write the principal indices, the counts' parameters and the notes."""
     axes.set_axis_off()
-    rows = [
-        (index.title, index.symbol, format_value(evaluation.values[index.key], index.unit))
-        for index in evaluation.evaluator.indices
-        if index.main
-    ]
+    rows = evaluation_table(evaluation, (index for index in evaluation.evaluator.indices if index.main)).rows
     table = axes.table(
-        cellText=rows,
+        cellText=[list(map(str, row)) for row in rows],
         colLabels=("index", "symbol", "value"),
         colWidths=(0.6, 0.17, 0.26),
         cellLoc="left",

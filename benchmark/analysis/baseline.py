@@ -20,10 +20,10 @@ from ...core.registry import nearest_hint
 from ...evaluators.base import Evaluator
 from ..identity.provenance import CodeVersion
 from ..identity.recipes import PluginRecipe, SceneRecipe
-from ..plan import Judge
+from ..plan import KeyedEvaluator
 from ..store.records import RunRow
 from ..store.writer import Store
-from ..suite import Entrant, Suite
+from ..suite import DetectorEntry, Suite
 
 __all__ = ["Baseline", "BaselineScene", "Measured", "measure"]
 
@@ -81,9 +81,9 @@ class Baseline:
 
     def to_suite(self) -> Suite:
         """Return the suite that repeats it."""
-        entrants = tuple(Entrant(found.recipe.detector(), found.seeds) for found in self.detectors.values())
+        detectors = tuple(DetectorEntry(found.recipe.detector(), found.seeds) for found in self.detectors.values())
         scenes = tuple(scene.recipe for scene in self.scenes.values())
-        return Suite(self.suite, scenes, entrants, (self.evaluator.evaluator(),))
+        return Suite(self.suite, scenes, detectors, (self.evaluator.evaluator(),))
 
     def counterparts(self, labels: Sequence[str]) -> dict[str, str]:
         """Return for each of these detectors the label of the one here that it is compared with.
@@ -217,9 +217,11 @@ class Baseline:
         )
 
 
-def measure(suite: Suite, rows: Sequence[RunRow], store: Store, judge: Judge, version: CodeVersion) -> Baseline:
+def measure(
+    suite: Suite, rows: Sequence[RunRow], store: Store, keyed: KeyedEvaluator, version: CodeVersion
+) -> Baseline:
     """Return what stored runs of a suite reached."""
-    values = store.index_values([row.id for row in rows if row.status == "ok"], judge.key)
+    values = store.index_values([row.id for row in rows if row.status == "ok"], keyed.key)
     scenes: dict[str, BaselineScene] = {}
     for row in rows:
         if row.scene not in scenes:
@@ -227,18 +229,18 @@ def measure(suite: Suite, rows: Sequence[RunRow], store: Store, judge: Judge, ve
             if scene.content_hash is not None and scene.reference is not None:
                 scenes[row.scene] = BaselineScene(_portable(scene.recipe), scene.content_hash)
     detectors = {}
-    for entrant in suite.entrants:
+    for entry in suite.detectors:
         runs: dict[tuple[str, int], Mapping[str, float | None] | None] = {}
         for row in rows:
-            if row.label == entrant.label and row.scene in scenes:
+            if row.label == entry.label and row.scene in scenes:
                 found = values.get(row.id)
-                runs[row.scene, row.seed] = None if found is None else _rounded(found, judge.evaluator)
-        detectors[entrant.label] = Measured(PluginRecipe.of(entrant.detector), entrant.seeds, runs)
+                runs[row.scene, row.seed] = None if found is None else _rounded(found, keyed.evaluator)
+        detectors[entry.label] = Measured(PluginRecipe.of(entry.detector), entry.seeds, runs)
     return Baseline(
         suite=suite.name,
         version=version,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
-        evaluator=judge.recipe,
+        evaluator=keyed.recipe,
         scenes=scenes,
         detectors=detectors,
     )

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 
 from ...core.errors import InputError
 from ...evaluators.base import Index
-from ...reports.comparison_text import ComparedRow, StoreComparison
-from ..plan import Judge
+from ..plan import KeyedEvaluator
 from ..store.records import RunRow
 from ..store.writer import Store
 from .inference import bootstrap_interval
-from .report_contents import newest_runs, stored_judges
+from .report_contents import newest_runs, stored_evaluators
+from .results import ComparedRow, StoreComparison
 
 __all__ = ["compare_stores"]
 
@@ -36,15 +36,15 @@ def compare_stores(
     Raises
     ------
     InputError
-        No evaluator has judged runs of both stores.
+        No evaluator has evaluated runs of both stores.
     """
     rows = [newest_runs(store, detector=detector, scene=scene) for store in (first, second)]
-    judges = [stored_judges(store, mine) for store, mine in zip((first, second), rows, strict=True)]
-    labels = [{judge.label: judge for judge in mine} for mine in judges]
+    evaluators = [stored_evaluators(store, mine) for store, mine in zip((first, second), rows, strict=True)]
+    labels = [{keyed.label: keyed for keyed in mine} for mine in evaluators]
     common = next((label for label in labels[0] if label in labels[1]), None)
     if common is None:
         raise InputError(
-            f"{first.path} and {second.path} have no evaluator in common: judge one anew with 'roofbench score'"
+            f"{first.path} and {second.path} have no evaluator in common: evaluate one of them with 'roofbench score'"
         )
     one, two = (
         _cells(store, mine, known[common]) for store, mine, known in zip((first, second), rows, labels, strict=True)
@@ -72,8 +72,8 @@ def compare_stores(
     )
 
 
-def _cells(store: Store, rows: list[RunRow], judge: Judge) -> _Cells:
-    values = store.index_values([row.id for row in rows if row.status == "ok"], judge.key)
+def _cells(store: Store, rows: list[RunRow], keyed: KeyedEvaluator) -> _Cells:
+    values = store.index_values([row.id for row in rows if row.status == "ok"], keyed.key)
     hashes = store.scene_hashes()
     cells: _Cells = {}
     for row in rows:

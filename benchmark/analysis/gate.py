@@ -30,9 +30,9 @@ from collections.abc import Mapping, Sequence
 from ...core.errors import ParameterError, UnknownNameError
 from ...core.registry import nearest_hint
 from ...evaluators.base import Evaluator, Index
-from ...reports.gate_text import GateResult, IndexVerdict, Verdict
 from .baseline import Baseline, Measured
 from .inference import bootstrap_interval, holm, lowest_p, scenes_needed, sign_flip_p
+from .results import Conclusion, GateResult, IndexConclusion
 
 __all__ = ["DEFAULT_INDICES", "GATE_LEVEL", "compare", "different_scenes", "gated_indices", "margins_of", "seeds_share"]
 
@@ -108,15 +108,15 @@ def compare(
     indices: Sequence[Index],
     margins: Mapping[str, float],
     level: float = GATE_LEVEL,
-    extra: Sequence[IndexVerdict] = (),
+    extra: Sequence[IndexConclusion] = (),
 ) -> GateResult:
-    """Return the verdicts of every detector that both have; the scenes must be the same."""
-    verdicts: list[IndexVerdict] = []
+    """Return the conclusions of every detector that both have; the scenes must be the same."""
+    conclusions: list[IndexConclusion] = []
     failures: list[str] = []
     for label, before in baseline.detectors.items():
         after = candidate.detectors.get(label)
         if after is not None:
-            verdicts += compare_detector(label, before, after, indices=indices, margins=margins, level=level)
+            conclusions += compare_detector(label, before, after, indices=indices, margins=margins, level=level)
             failures += [
                 f"{label} on {scene}, seed {seed}"
                 for (scene, seed), values in before.runs.items()
@@ -125,7 +125,7 @@ def compare(
     return GateResult(
         baseline=str(baseline.version),
         candidate=str(candidate.version),
-        verdicts=(*verdicts, *extra),
+        conclusions=(*conclusions, *extra),
         failures=tuple(failures),
         level=level,
     )
@@ -139,8 +139,8 @@ def compare_detector(
     indices: Sequence[Index],
     margins: Mapping[str, float],
     level: float = GATE_LEVEL,
-) -> list[IndexVerdict]:
-    """Return the verdict of every index of one detector."""
+) -> list[IndexConclusion]:
+    """Return the conclusion of every index of one detector."""
     pairs = [_pairs(before, after, index) for index in indices]
     differences = [
         [new - old if index.better == "higher" else old - new for old, new in found.values()]
@@ -148,37 +148,37 @@ def compare_detector(
     ]
     worse = _adjusted([[d + margins[i.key] for d in ds] for i, ds in zip(indices, differences, strict=True)])
     better = _adjusted([[margins[i.key] - d for d in ds] for i, ds in zip(indices, differences, strict=True)])
-    verdicts = []
+    conclusions = []
     for place, index in enumerate(indices):
         found, ds, margin = pairs[place], differences[place], margins[index.key]
         effect = statistics.fmean(ds) if ds else None
         low, high = bootstrap_interval(ds) or (None, None)
-        verdict: Verdict = "undecided"
+        conclusion: Conclusion = "undecided"
         p: float | None = None
         note = ""
         if lowest_p(len(ds)) > level / len(indices):
-            verdict = "not measurable"
+            conclusion = "not measurable"
             note = (
                 f"{label}: {len(indices)} indices at level {level:g} need {scenes_needed(len(indices), level)} scenes "
                 f"where both sides are defined, not {len(ds)}"
             )
         elif effect is not None and low is not None and high is not None:
             if effect < -margin and worse[place] <= level:
-                verdict, p = "worse", worse[place]
+                conclusion, p = "worse", worse[place]
             elif effect > margin and better[place] <= level:
-                verdict, p = "better", better[place]
+                conclusion, p = "better", better[place]
             elif -margin <= low and high <= margin:
-                verdict = "equal"
+                conclusion = "equal"
             else:
                 p = None if abs(effect) <= margin else worse[place] if effect < 0 else better[place]
                 share = seeds_share(before, after, index)
                 if share is not None and share >= 0.5:
                     note = f"{label}: seeds make {100 * share:.0f} % of the scatter of {index.title}: more narrow it"
-        verdicts.append(
-            IndexVerdict(
+        conclusions.append(
+            IndexConclusion(
                 detector=label,
                 index=index,
-                verdict=verdict,
+                conclusion=conclusion,
                 baseline=statistics.fmean(old for old, _ in found.values()) if found else None,
                 candidate=statistics.fmean(new for _, new in found.values()) if found else None,
                 effect=effect,
@@ -190,7 +190,7 @@ def compare_detector(
                 note=note or _lost(label, before, after, index),
             )
         )
-    return verdicts
+    return conclusions
 
 
 def _adjusted(differences: Sequence[Sequence[float]]) -> list[float]:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "LEVEL",
     "bootstrap_interval",
     "expanded_level",
     "holm",

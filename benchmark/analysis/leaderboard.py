@@ -13,8 +13,7 @@ import numpy as np
 from ...core.errors import UnknownNameError
 from ...core.registry import nearest_hint
 from ...evaluators.base import Evaluation, Evaluator, Index
-from ...reports.tables import Cell, Entry, Incident, Leaderboard
-from ..plan import Judge
+from ..plan import KeyedEvaluator
 from ..store.records import RunRow
 from ..store.writer import Store
 from .inference import (
@@ -27,14 +26,15 @@ from .inference import (
     resampling_weights,
     scenes_needed,
 )
+from .results import Cell, Entry, Leaderboard, UnsuccessfulRun
 
-__all__ = ["default_rank_index", "incidents_of", "make_leaderboard", "rank_index", "repeat_command"]
+__all__ = ["default_rank_index", "make_leaderboard", "rank_index", "repeat_command", "unsuccessful_runs"]
 
 _RESAMPLES = 1000  # of pooled indices, each of which is summarised anew
 
 
 def make_leaderboard(
-    rows: Sequence[RunRow], store: Store, judge: Judge, *, title: str, rank_by: str | None = None
+    rows: Sequence[RunRow], store: Store, keyed: KeyedEvaluator, *, title: str, rank_by: str | None = None
 ) -> Leaderboard:
     """Return the leaderboard of stored runs by one evaluator.
 
@@ -43,7 +43,7 @@ def make_leaderboard(
     rows : sequence of RunRow
         Runs of every status.
     store : Store
-    judge : Judge
+    keyed : KeyedEvaluator
     title : str
     rank_by : str, optional
         Index key; the evaluator's first quality by default.
@@ -54,17 +54,17 @@ def make_leaderboard(
     values add the tallies of all runs. A detector without a result on some scene has no rank: its figures are over
     other scenes than those of the rest.
     """
-    evaluations = store.evaluations([row.id for row in rows if row.status == "ok"], judge.evaluator, judge.key)
+    evaluations = store.evaluations([row.id for row in rows if row.status == "ok"], keyed.evaluator, keyed.key)
     counts = store.reference_counts()
     bare = tuple(dict.fromkeys(row.scene for row in rows if counts.get(row.scene_id, 0) is None))
     rows = [row for row in rows if row.scene not in bare]
     scenes = tuple(dict.fromkeys(row.scene for row in rows))
-    indices = tuple(index for index in judge.evaluator.indices if index.main)
-    ranking = rank_index(judge.evaluator, rank_by)
+    indices = tuple(index for index in keyed.evaluator.indices if index.main)
+    ranking = rank_index(keyed.evaluator, rank_by)
     if ranking.key not in [index.key for index in indices]:
         indices = (*indices, ranking)
     boards = [
-        _Tally(label, [row for row in rows if row.label == label], evaluations, judge.evaluator, counts)
+        _Tally(label, [row for row in rows if row.label == label], evaluations, keyed.evaluator, counts)
         for label in dict.fromkeys(row.label for row in rows)
     ]
     sign = -1 if ranking.better == "higher" else 1
@@ -85,13 +85,13 @@ def make_leaderboard(
     notes = [*group_note, *_notes(boards, scenes), *(f"{scene} has no reference and is left out" for scene in bare)]
     return Leaderboard(
         title=title,
-        evaluator=_described(judge.evaluator),
+        evaluator=_described(keyed.evaluator),
         rank_by=ranking,
         indices=indices,
         entries=tuple(entries),
         scenes=scenes,
         notes=tuple(notes),
-        incidents=incidents_of(rows),
+        unsuccessful=unsuccessful_runs(rows),
     )
 
 
@@ -109,15 +109,15 @@ class _Tally:
         self.label = label
         self.rows = rows
         self._evaluator = evaluator
-        self._judged = [row for row in rows if row.id in evaluations]
-        self._evaluations = [evaluations[row.id] for row in self._judged]
+        self._evaluated = [row for row in rows if row.id in evaluations]
+        self._evaluations = [evaluations[row.id] for row in self._evaluated]
         self._sum = evaluator.pool(self._evaluations) if self._evaluations else None
-        self._reference = sum(references[row.scene_id] or 0 for row in self._judged)
+        self._reference = sum(references[row.scene_id] or 0 for row in self._evaluated)
 
     @property
     def scenes(self) -> int:
         """Scenes all of whose runs have a result."""
-        return len({row.scene for row in self._judged} - {row.scene for row in self.rows if row.status != "ok"})
+        return len({row.scene for row in self._evaluated} - {row.scene for row in self.rows if row.status != "ok"})
 
     def pooled(self, index: Index) -> Cell:
         """Return the ratio of the tallies of all runs, with its interval over resampled scenes."""
@@ -130,11 +130,11 @@ class _Tally:
     def _pooled_intervals(self) -> dict[str, tuple[float, float]]:
         """Return the interval of every pooled index: scenes are resampled and their tallies added anew."""
         names = sorted({name for evaluation in self._evaluations for name in evaluation.tallies})
-        scenes = {scene: place for place, scene in enumerate(dict.fromkeys(row.scene for row in self._judged))}
+        scenes = {scene: place for place, scene in enumerate(dict.fromkeys(row.scene for row in self._evaluated))}
         if len(scenes) < 2:
             return {}
         tallies = np.zeros((len(scenes), len(names)))
-        for row, evaluation in zip(self._judged, self._evaluations, strict=True):
+        for row, evaluation in zip(self._evaluated, self._evaluations, strict=True):
             tallies[scenes[row.scene]] += [evaluation.tallies.get(name, 0.0) for name in names]
         resampled: dict[str, list[float]] = {}
         for sums in resampling_weights(len(scenes), _RESAMPLES) @ tallies:
@@ -153,7 +153,7 @@ class _Tally:
     def scene_values(self, index: Index) -> dict[str, float]:
         """Return the mean over seeds of each scene where the index is defined."""
         values: dict[str, list[float]] = {}
-        for row, evaluation in zip(self._judged, self._evaluations, strict=True):
+        for row, evaluation in zip(self._evaluated, self._evaluations, strict=True):
             value = evaluation.values[index.key]
             if value is not None:
                 values.setdefault(row.scene, []).append(value)
@@ -183,7 +183,7 @@ class _Tally:
                     runs=len(self.rows),
                     failed=sum(row.status == "failed" for row in self.rows),
                     skipped=sum(row.status == "skipped" for row in self.rows),
-                    detected=sum(row.detected or 0 for row in self._judged),
+                    detected=sum(row.detected or 0 for row in self._evaluated),
                     reference=self._reference,
                     cpu_seconds=statistics.median(row.cpu_seconds for row in done) if done else None,
                     peak_memory=max((row.peak_memory for row in done), default=None),
@@ -249,11 +249,11 @@ def _notes(boards: Sequence[_Tally], scenes: Sequence[str]) -> tuple[str, ...]:
     )
 
 
-def incidents_of(rows: Iterable[RunRow]) -> tuple[Incident, ...]:
+def unsuccessful_runs(rows: Iterable[RunRow]) -> tuple[UnsuccessfulRun, ...]:
     """Return failures, then skips."""
     found = [row for status in ("failed", "skipped") for row in rows if row.status == status]
     return tuple(
-        Incident(
+        UnsuccessfulRun(
             status=row.status,
             label=row.label,
             scene=row.scene,

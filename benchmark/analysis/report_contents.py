@@ -13,19 +13,18 @@ from datetime import UTC, datetime
 
 from ...core.errors import InputError, RoofbenchError
 from ...evaluators.base import Index
-from ...reports.gate_text import GateResult
-from ...reports.published import PUBLISHED, Comparison, OursRow
-from ...reports.report_data import CostPoint, Provenance, Report, Sensitivity
-from ...reports.tables import Leaderboard
 from ..identity.provenance import code_version
-from ..plan import Judge
+from ..plan import KeyedEvaluator
 from ..store.records import RunRow
 from ..store.writer import Store
 from .leaderboard import make_leaderboard
+from .published import PUBLISHED, Comparison, OursRow
+from .report_data import CostPoint, Provenance, Report, Sensitivity
 from .report_scenes import draw_scenes
+from .results import GateResult, Leaderboard
 from .sensitivity import stored_sensitivities
 
-__all__ = ["fill_report", "newest_runs", "stored_judges"]
+__all__ = ["fill_report", "newest_runs", "stored_evaluators"]
 
 Values = Mapping[int, Mapping[str, float | None]]
 
@@ -49,22 +48,22 @@ def newest_runs(store: Store, *, detector: str | None = None, scene: str | None 
     return sorted(newest.values(), key=lambda row: row.id)
 
 
-def stored_judges(store: Store, rows: Sequence[RunRow]) -> list[Judge]:
-    """Return the evaluators that judged these runs, the one that judged most of them first.
+def stored_evaluators(store: Store, rows: Sequence[RunRow]) -> list[KeyedEvaluator]:
+    """Return the evaluators that evaluated these runs, the one that evaluated most of them first.
 
-    Of evaluators that differ in their code only, the one that judged most; one whose plugin is not here is left out.
+    Of evaluators that differ in their code only, the one that evaluated most; one whose plugin is not here is left out.
     """
     good = [row.id for row in rows if row.status == "ok"]
-    found: dict[str, tuple[int, Judge]] = {}
+    found: dict[str, tuple[int, KeyedEvaluator]] = {}
     for key, recipe in store.evaluators():
         try:
-            judge = Judge(recipe.evaluator(), recipe, key)
+            keyed = KeyedEvaluator(recipe.evaluator(), recipe, key)
         except RoofbenchError:
             continue
         count = len(store.evaluated(good, key))
-        if count > found.get(judge.label, (0, judge))[0]:
-            found[judge.label] = (count, judge)
-    return [judge for _, judge in sorted(found.values(), key=lambda pair: -pair[0])]
+        if count > found.get(keyed.label, (0, keyed))[0]:
+            found[keyed.label] = (count, keyed)
+    return [keyed for _, keyed in sorted(found.values(), key=lambda pair: -pair[0])]
 
 
 def fill_report(
@@ -72,7 +71,7 @@ def fill_report(
     rows: Sequence[RunRow],
     *,
     title: str,
-    judged: Sequence[tuple[Judge, Leaderboard]] | None = None,
+    evaluated: Sequence[tuple[KeyedEvaluator, Leaderboard]] | None = None,
     rank_by: str | None = None,
     gate: GateResult | None = None,
     sensitivities: Sequence[Sensitivity] = (),
@@ -86,7 +85,7 @@ def fill_report(
     rows : sequence of RunRow
         Of every status; see `newest_runs`.
     title : str
-    judged : sequence of (Judge, Leaderboard), optional
+    evaluated : sequence of (KeyedEvaluator, Leaderboard), optional
         Evaluators with their leaderboards, where they are made already.
     rank_by : str, optional
         Index key.
@@ -96,25 +95,25 @@ def fill_report(
     level : float
         Quality that break-down points are about.
     """
-    if judged is None:
-        judged = [
-            (judge, make_leaderboard(rows, store, judge, title=title, rank_by=rank_by if place == 0 else None))
-            for place, judge in enumerate(stored_judges(store, rows))
+    if evaluated is None:
+        evaluated = [
+            (keyed, make_leaderboard(rows, store, keyed, title=title, rank_by=rank_by if place == 0 else None))
+            for place, keyed in enumerate(stored_evaluators(store, rows))
         ]
-    if not rows or not judged:
+    if not rows or not evaluated:
         raise InputError(f"{store.path} holds no evaluated run to report: 'roofbench run' makes some")
-    judge, board = judged[0]
+    keyed, board = evaluated[0]
     good = [row for row in rows if row.status == "ok"]
     numbers = [row.id for row in good]
-    values = store.index_values(numbers, judge.key)
+    values = store.index_values(numbers, keyed.key)
     drawn = None
-    for other, _ in judged:  # the first whose verdicts are of the known kinds
-        own = values if other is judge else store.index_values(numbers, other.key)
+    for other, _ in evaluated:  # the first whose verdicts are of the known kinds
+        own = values if other is keyed else store.index_values(numbers, other.key)
         drawn = drawn or draw_scenes(store, good, other.key, own, _labels(board))
-    found = [*sensitivities, *stored_sensitivities(good, values, judge, level=level)]
+    found = [*sensitivities, *stored_sensitivities(good, values, keyed, level=level)]
     return Report(
         title=title,
-        boards=tuple(board for _, board in judged),
+        boards=tuple(board for _, board in evaluated),
         matrix=_matrix(good, values, board.rank_by),
         scenes=() if drawn is None else drawn.scenes,
         errors=() if drawn is None else drawn.errors,

@@ -11,16 +11,17 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...reports.report_data import Error, Overlay, SceneView, Side, SizeBin, SizeCurve
-from ...reports.scene_picture import ScenePicture
-from ...reports.verdict_map import VERDICT_STYLE
+from ..execution.scene_picture import ScenePicture
 from ..store.records import RunRow, StoredScene
 from ..store.writer import Store
+from .report_data import Error, Overlay, SceneView, Side, SizeBin, SizeCurve
 
 __all__ = ["Drawn", "draw_scenes", "scene_view"]
 
 #: What is drawn at most, so that the page stays small: scenes, detectors on a scene, objects in all overlays together.
 _MOST_SCENES, _MOST_OVERLAYS, _MOST_OBJECTS = 48, 8, 65_000
+#: Verdicts that can be drawn.
+_VERDICTS = {"TP", "MD", "FP", "FN", "left out"}
 #: Runs that sizes are counted over at most.
 _MOST_SIZED = 600
 _ERRORS_PER_DETECTOR, _ERRORS_PER_SCENE, _MOST_ERRORS = 6, 2, 36
@@ -58,9 +59,9 @@ def draw_scenes(
     labels : sequence of str
         Detectors, the most interesting first.
     """
-    judged = [row for row in rows if row.id in values]
+    evaluated = [row for row in rows if row.id in values]
     by_scene: dict[int, dict[str, RunRow]] = {}
-    for row in sorted(judged, key=lambda row: row.seed):
+    for row in sorted(evaluated, key=lambda row: row.seed):
         by_scene.setdefault(row.scene_id, {}).setdefault(row.label, row)  # the lowest seed of each detector
     views: list[SceneView] = []
     objects = 0
@@ -80,7 +81,7 @@ def draw_scenes(
             break
     if not views:
         return None
-    sized = _evenly(judged, _MOST_SIZED)
+    sized = _evenly(evaluated, _MOST_SIZED)
     sampling = []
     if len(views) < len(order):
         sampling.append(
@@ -89,10 +90,10 @@ def draw_scenes(
     hidden = len(labels) - _MOST_OVERLAYS
     if hidden > 0:
         sampling.append(f"Maps show the {_MOST_OVERLAYS} detectors that rank highest; {hidden} more are in the store.")
-    if len({row.seed for row in judged}) > 1:
+    if len({row.seed for row in evaluated}) > 1:
         sampling.append("Maps show the lowest seed of each detector.")
-    if len(sized) < len(judged):
-        sampling.append(f"Building sizes are counted over {len(sized)} of {len(judged)} runs, evenly spread.")
+    if len(sized) < len(evaluated):
+        sampling.append(f"Building sizes are counted over {len(sized)} of {len(evaluated)} runs, evenly spread.")
     return Drawn(
         scenes=tuple(views),
         errors=_worst(views),
@@ -108,7 +109,7 @@ def scene_view(store: Store, scene: StoredScene, rows: Iterable[RunRow], key: st
     overlays = []
     for row in rows:
         sides = store.verdicts(row.id, key)
-        if not {each["verdict"] for side in sides.values() for each in side} <= VERDICT_STYLE.keys():
+        if not {each["verdict"] for side in sides.values() for each in side} <= _VERDICTS:
             continue
         detected = store.detections(row.id)
         if (len(sides["detection"]), len(sides["reference"])) != (len(detected), len(scene.reference)):

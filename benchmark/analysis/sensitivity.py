@@ -18,12 +18,12 @@ from ...core.registry import nearest_hint
 from ...detectors.registry import make_detector
 from ...evaluators.base import Index
 from ...evaluators.registry import make_evaluator
-from ...reports.report_data import Sensitivity, SensitivityPoint
 from ...scenes.synthetic.presets import preset, preset_names
 from ...scenes.synthetic.recipe import SceneParameters
-from ..plan import Judge
+from ..plan import KeyedEvaluator
 from ..store.records import RunRow
 from .inference import bootstrap_interval
+from .report_data import Sensitivity, SensitivityPoint
 from .sweep import find_break_down
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def sensitivity_indices(indices: Sequence[Index], chosen: Sequence[str] = ()) ->
 
 
 def stored_sensitivities(
-    rows: Sequence[RunRow], values: Values, judge: Judge, *, level: float, chosen: Sequence[str] = ()
+    rows: Sequence[RunRow], values: Values, keyed: KeyedEvaluator, *, level: float, chosen: Sequence[str] = ()
 ) -> list[Sensitivity]:
     """Return the sweeps that stored runs make up: axes with at least two values.
 
@@ -59,14 +59,14 @@ def stored_sensitivities(
         Of status ``ok``.
     values : mapping of int to mapping
         Index values by run.
-    judge : Judge
+    keyed : KeyedEvaluator
     level : float
         Value of the first index at which a detector counts as broken down.
     chosen : sequence of str
         Index keys; object- and area-based quality by default.
     """
     rows = [row for row in rows if row.id in values]
-    indices = sensitivity_indices(judge.evaluator.indices, chosen)
+    indices = sensitivity_indices(keyed.evaluator.indices, chosen)
     lines = []
     for axis, unit, default, label, by_value in itertools.chain(_scene_axes(rows), _detector_axes(rows)):
         for index in indices:

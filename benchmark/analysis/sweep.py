@@ -28,10 +28,10 @@ from ...scenes.scene import Scene
 from ..execution.runner import Execution, run_plan
 from ..execution.tasks import Outcome
 from ..identity.recipes import SceneRecipe
-from ..plan import Judge, Overwrite, Plan, PlannedRun, make_plan
+from ..plan import KeyedEvaluator, Overwrite, Plan, PlannedRun, make_plan
 from ..store.records import RunRow
 from ..store.writer import Store
-from ..suite import Entrant, Suite
+from ..suite import DetectorEntry, Suite
 from .inference import bootstrap_interval
 
 if TYPE_CHECKING:
@@ -170,23 +170,23 @@ def make_sweep(
     """
     _check_axes(suite, axes)
     points: list[tuple[Point, Detector, Plan]] = []
-    for entrant in suite.entrants:
+    for entry in suite.detectors:
         for point in _points(axes, grid=grid):
             own = {name: value for name, value in point.values.items() if not name.startswith(_SCENE)}
-            if not own.keys() <= entrant.detector.parameters().keys():
+            if not own.keys() <= entry.detector.parameters().keys():
                 continue  # another detector's axis
-            detector = type(entrant.detector).build({**entrant.detector.values(), **own})
-            part = replace(suite, scenes=_scenes(suite, point), entrants=(Entrant(detector, entrant.seeds),))
-            points.append((point, entrant.detector, make_plan(part, store, overwrite=overwrite)))
+            detector = type(entry.detector).build({**entry.detector.values(), **own})
+            part = replace(suite, scenes=_scenes(suite, point), detectors=(DetectorEntry(detector, entry.seeds),))
+            points.append((point, entry.detector, make_plan(part, store, overwrite=overwrite)))
     runs = {run.identity.key: run for _, _, plan in points for run in plan.runs}
     ordered = sorted(runs.values(), key=lambda run: run.identity.scene.name)  # workers keep the scene they have open
-    judges = points[0][2].judges
-    detectors = tuple(entrant.detector for entrant in suite.entrants)
-    return Sweep(tuple(axes), detectors, tuple(points), Plan(suite, tuple(ordered), judges))
+    evaluators = points[0][2].evaluators
+    detectors = tuple(entry.detector for entry in suite.detectors)
+    return Sweep(tuple(axes), detectors, tuple(points), Plan(suite, tuple(ordered), evaluators))
 
 
 def _check_axes(suite: Suite, axes: Sequence[Axis]) -> None:
-    known = {name for entrant in suite.entrants for name in entrant.detector.parameters()}
+    known = {name for entry in suite.detectors for name in entry.detector.parameters()}
     synthetic = any(not isinstance(scene, Scene) and scene.kind == "preset" for scene in suite.scenes)
     if not axes:
         raise ParameterError("nothing is varied: give --vary NAME=VALUE,VALUE,...")
@@ -196,7 +196,7 @@ def _check_axes(suite: Suite, axes: Sequence[Axis]) -> None:
                 f"{axis.name} is an axis of the generator, but no scene of {suite.name!r} is synthetic"
             )
         if not axis.of_scene and axis.name not in known:
-            names = ", ".join(entrant.detector.name for entrant in suite.entrants)
+            names = ", ".join(entry.detector.name for entry in suite.detectors)
             raise ParameterError(
                 f"{names}: no parameter {axis.name!r}{nearest_hint(axis.name, known)} to vary; an axis of the "
                 f"generator is written {_SCENE}NAME"
@@ -253,10 +253,10 @@ def sweep_table(sweep: Sweep, store: Store, rows: Mapping[str, RunRow]) -> pd.Da
 
     good = [row.id for row in rows.values() if row.status == "ok"]
     records: list[dict[str, Any]] = []
-    for judge in sweep.plan.judges:
-        values = store.index_values(good, judge.key)
+    for keyed in sweep.plan.evaluators:
+        values = store.index_values(good, keyed.key)
         for point, detector, plan in sweep.points:
-            records += _records(point, detector, judge, [rows[key] for key in plan.keys if key in rows], values)
+            records += _records(point, detector, keyed, [rows[key] for key in plan.keys if key in rows], values)
     names = [axis.name for axis in sweep.axes]
     columns = ["detector", "axis", *names, "evaluator", "index", "symbol", "unit", "mean", "low", "high", "scenes"]
     return pd.DataFrame.from_records(records, columns=[*columns, "runs", "failed", "skipped"])
@@ -265,20 +265,20 @@ def sweep_table(sweep: Sweep, store: Store, rows: Mapping[str, RunRow]) -> pd.Da
 def _records(
     point: Point,
     detector: Detector,
-    judge: Judge,
+    keyed: KeyedEvaluator,
     rows: Sequence[RunRow],
     values: Mapping[int, Mapping[str, float | None]],
 ) -> Iterator[dict[str, Any]]:
     common = {
-        "detector": Entrant(detector).label,
+        "detector": DetectorEntry(detector).label,
         "axis": point.axis,
         **point.values,
-        "evaluator": judge.label,
+        "evaluator": keyed.label,
         "runs": len(rows),
         "failed": sum(row.status == "failed" for row in rows),
         "skipped": sum(row.status == "skipped" for row in rows),
     }
-    for index in judge.evaluator.indices:
+    for index in keyed.evaluator.indices:
         by_scene: dict[str, list[float]] = {}
         for row in rows:
             value = values.get(row.id, {}).get(index.key)

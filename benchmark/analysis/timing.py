@@ -22,11 +22,11 @@ from pathlib import Path
 from ...core.errors import UnsupportedError
 from ...core.package import FOLDER, NAME
 from ...evaluators.base import Index
-from ...reports.gate_text import IndexVerdict, Verdict
 from ..execution.isolation import IsolatedProcess, Limits
 from ..execution.tasks import Outcome, Task
 from .baseline import Baseline
 from .inference import LEVEL, bootstrap_interval, lowest_p, scenes_needed, sign_flip_p
+from .results import Conclusion, IndexConclusion
 
 __all__ = ["SPEED", "time_side_by_side"]
 
@@ -44,8 +44,8 @@ SPEED = Index(
 
 def time_side_by_side(
     baseline: Baseline, candidate: Baseline, *, repeats: int = 3, margin: float = 0.1, level: float = LEVEL
-) -> list[IndexVerdict]:
-    """Return a verdict on the run time of every detector of a baseline.
+) -> list[IndexConclusion]:
+    """Return a conclusion on the run time of every detector of a baseline.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def time_side_by_side(
         old, new = IsolatedProcess(python_path=old_path), IsolatedProcess()
         try:
             return [
-                _verdict(label, _log_ratios(baseline, candidate, label, old, new, repeats), margin, level)
+                _conclusion(label, _log_ratios(baseline, candidate, label, old, new, repeats), margin, level)
                 for label in baseline.detectors
             ]
         finally:
@@ -121,29 +121,29 @@ def _log_ratios(
     return ratios
 
 
-def _verdict(label: str, ratios: Sequence[float], margin: float, level: float) -> IndexVerdict:
-    """Return the verdict on log ratios; positive is slower."""
+def _conclusion(label: str, ratios: Sequence[float], margin: float, level: float) -> IndexConclusion:
+    """Return the conclusion on log ratios; positive is slower."""
     bound = math.log1p(margin)
     mean = statistics.fmean(ratios) if ratios else None
     low, high = bootstrap_interval(ratios) or (None, None)
-    verdict: Verdict = "undecided"
+    conclusion: Conclusion = "undecided"
     p: float | None = None
     note = ""
     if mean is None or low is None or high is None or lowest_p(len(ratios)) > level:
-        verdict = "not measurable"
+        conclusion = "not measurable"
         note = f"{label}: run time needs {scenes_needed(1, level)} scenes on which both versions ran, not {len(ratios)}"
     elif mean > bound:
         p = min(1.0, 2 * sign_flip_p([bound - ratio for ratio in ratios]))
-        verdict = "worse" if p <= level else "undecided"
+        conclusion = "worse" if p <= level else "undecided"
     elif mean < -bound:
         p = min(1.0, 2 * sign_flip_p([ratio + bound for ratio in ratios]))
-        verdict = "better" if p <= level else "undecided"
+        conclusion = "better" if p <= level else "undecided"
     elif -bound <= low and high <= bound:
-        verdict = "equal"
-    return IndexVerdict(
+        conclusion = "equal"
+    return IndexConclusion(
         detector=label,
         index=SPEED,
-        verdict=verdict,
+        conclusion=conclusion,
         baseline=1.0,
         candidate=None if mean is None else math.exp(mean),
         effect=None if mean is None else 1 - math.exp(mean),

@@ -25,7 +25,14 @@ from typing import IO
 from .memory import bound_allocations, highest_memory
 from .tasks import Cost, Outcome
 
-__all__ = ["THREAD_LIMITS", "IsolatedProcess", "Limits", "call_isolated"]
+__all__ = [
+    "THREAD_LIMITS",
+    "IsolatedProcess",
+    "Limits",
+    "call_isolated",
+    "close_isolated",
+    "serve",
+]
 
 #: One thread per numeric library and process.
 THREAD_LIMITS = {

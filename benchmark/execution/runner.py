@@ -14,7 +14,7 @@ from ...scenes.scene import Scene
 from ..identity.provenance import code_version
 from ..identity.recipes import PluginRecipe, SceneRecipe
 from ..identity.spool import spool
-from ..plan import Judge, Overwrite, Plan, PlannedRun, scene_recipe
+from ..plan import KeyedEvaluator, Overwrite, Plan, PlannedRun, scene_recipe
 from ..store.records import RunRow
 from ..store.writer import Store
 from .dispatch import Dispatcher
@@ -120,7 +120,7 @@ def run_plan(
     return RunResult(rows=rows, done=done, evaluated=evaluated)
 
 
-def score_stored(store: Store, run_id: int, judges: tuple[Judge, ...]) -> int:
+def score_stored(store: Store, run_id: int, evaluators: tuple[KeyedEvaluator, ...]) -> int:
     """Evaluate stored detections by further evaluators; nothing is detected and no scene is opened.
 
     Returns how many evaluations were added: none for a scene without reference.
@@ -129,10 +129,10 @@ def score_stored(store: Store, run_id: int, judges: tuple[Judge, ...]) -> int:
     if scene.reference is None:
         return 0
     detected = store.detections(run_id)
-    for judge in judges:
-        evaluation = judge.evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.grid)
-        store.add_score(run_id, Score.of(evaluation, judge.recipe, judge.code))
-    return len(judges)
+    for keyed in evaluators:
+        evaluation = keyed.evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.grid)
+        store.add_score(run_id, Score.of(evaluation, keyed.recipe, keyed.code))
+    return len(evaluators)
 
 
 def _outcomes(
@@ -142,8 +142,8 @@ def _outcomes(
     if not runs:
         return
     described = store.described_scenes()
-    evaluators = tuple(judge.recipe for judge in plan.judges)
-    codes = tuple(judge.code for judge in plan.judges)
+    evaluators = tuple(keyed.recipe for keyed in plan.evaluators)
+    codes = tuple(keyed.code for keyed in plan.evaluators)
     with ExitStack() as stack:
         slots = stack.enter_context(_slots(execution, len(runs)))
         elsewhere = execution.jobs > 0 or execution.scheduler is not None
@@ -183,8 +183,8 @@ def _outcomes(
 
 def _in_process(run: PlannedRun, task: Task, plan: Plan) -> bytes:
     scene = run.scene if isinstance(run.scene, Scene) else None
-    evaluators = [judge.evaluator for judge in plan.judges]
-    return execute(task, scene=scene, detector=run.entrant.detector, evaluators=evaluators).to_bytes()
+    evaluators = [keyed.evaluator for keyed in plan.evaluators]
+    return execute(task, scene=scene, detector=run.entry.detector, evaluators=evaluators).to_bytes()
 
 
 def _outcome(future: Future[bytes]) -> Outcome:
@@ -202,7 +202,7 @@ def _is_stored(store: Store, run: PlannedRun) -> bool:
 
 def _must_be_portable(run: PlannedRun) -> None:
     if run.identity.detector.use.startswith("(this process)"):
-        PluginRecipe.of(run.entrant.detector)  # raises with the remedy
+        PluginRecipe.of(run.entry.detector)  # raises with the remedy
 
 
 class _Scenes:

@@ -3,7 +3,7 @@
 Nouns
 -----
 task
-    One detector with its parameters, one scene, one seed, and the evaluators that judge the result; a few hundred
+    One detector with its parameters, one scene, one seed, and the evaluators of the result; a few hundred
     bytes of JSON.
 outcome
     What became of it: status ``ok``, ``failed`` or ``skipped``, with reason, cost, raw detections and evaluations.
@@ -162,7 +162,7 @@ def _plain(value: Any) -> Any:
 class SceneRecord:
     """What the store keeps of a scene: enough to evaluate and to draw verdicts without opening it again.
 
-    `picture` is a WebP file over the extent (see `reports.scene_picture`), `point_count` the size of the point cloud.
+    `picture` is a WebP file over the extent (see `scene_picture`), `point_count` the size of the point cloud.
     """
 
     content_hash: str

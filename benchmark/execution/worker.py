@@ -20,12 +20,12 @@ from ...core.errors import RoofbenchError
 from ...detectors.base import Detector
 from ...detectors.checks import checked_output
 from ...evaluators.base import Evaluator
-from ...reports.scene_picture import scene_picture
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.scene import Scene
 from ..identity.keys import random_stream_entropy
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
 from .memory import highest_memory, reset_highest_memory
+from .scene_picture import scene_picture
 from .tasks import Cost, Outcome, SceneRecord, Score, Task, _plain
 
 __all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream"]

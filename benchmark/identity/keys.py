@@ -28,7 +28,14 @@ from typing import Any
 
 from ...core.package import FOLDER, HOMES, NAME
 
-__all__ = ["SourceClosure", "canonical", "digest", "random_stream_entropy", "source_closure"]
+__all__ = [
+    "SourceClosure",
+    "canonical",
+    "digest",
+    "module_closure",
+    "random_stream_entropy",
+    "source_closure",
+]
 
 
 def canonical(value: Any) -> str:

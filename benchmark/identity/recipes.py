@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, Self, cast
 
 from ...core.errors import ParameterError, UnsupportedError
+from ...core.parameters import parameter_text
 from ...core.registry import Registry
 from ...detectors.base import Detector
 from ...detectors.registry import DETECTORS, make_detector
@@ -36,12 +37,8 @@ _BUILTIN = "scenes.builtin"
 
 def label_of(plugin: Detector | Evaluator) -> str:
     """Return the name with what differs from the defaults: ``ndsm[cell=0.25]``."""
-    changed = ",".join(f"{name}={_short(value)}" for name, value in plugin.changed().items())
+    changed = ",".join(f"{name}={parameter_text(value)}" for name, value in plugin.changed().items())
     return f"{plugin.name}[{changed}]" if changed else plugin.name
-
-
-def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True)
@@ -137,7 +134,7 @@ class SceneRecipe:
             No such preset or parameter, or a value outside its range.
         """
         values = _checked_parameters(name, parameters or {})
-        axes = ",".join(f"{key}={_short(value)}" for key, value in values.items())
+        axes = ",".join(f"{key}={parameter_text(value)}" for key, value in values.items())
         full_name = f"{name}-{seed}" + (f"[{axes}]" if axes else "")
         return cls("builtin" if name == _HAMLET else "preset", full_name, name, seed, values)
 

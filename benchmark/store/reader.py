@@ -244,12 +244,12 @@ class StoreReader:
         return sides
 
     def evaluators(self) -> list[tuple[str, PluginRecipe]]:
-        """Return the key and recipe of every evaluator that has judged a run."""
+        """Return the key and recipe of every evaluator that has evaluated a run."""
         rows = self._db.execute("SELECT key, evaluator, parameters FROM evaluations GROUP BY key ORDER BY MIN(id)")
         return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
 
     def evaluators_of(self, run_id: int) -> list[tuple[str, PluginRecipe]]:
-        """Return the key and recipe of every evaluator that has judged this run."""
+        """Return the key and recipe of every evaluator that has evaluated this run."""
         query = "SELECT key, evaluator, parameters FROM evaluations WHERE run_id = ? ORDER BY id"
         rows = self._db.execute(query, (run_id,))
         return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]

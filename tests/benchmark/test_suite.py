@@ -36,7 +36,7 @@ def test_a_suite_lists_scenes_detectors_and_evaluators(suite_file):
     suite = read_suite(suite_file(GOOD))
     assert suite.name == "mine"
     assert [scene.name for scene in suite.scenes] == ["hamlet-4", "hamlet-7"]
-    assert [(entrant.label, entrant.seeds) for entrant in suite.entrants] == [("misbehaving[side=7]", (0, 1, 2))]
+    assert [(entry.label, entry.seeds) for entry in suite.detectors] == [("misbehaving[side=7]", (0, 1, 2))]
     assert [evaluator.matching for evaluator in suite.evaluators] == ["overlap"]
 
 

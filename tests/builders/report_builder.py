@@ -3,9 +3,8 @@
 import shapely
 
 import roofbench as rb
-from roofbench.evaluators.threshold_free.indices import INDICES
-from roofbench.reports.published import PUBLISHED, Comparison, OursRow
-from roofbench.reports.report_data import (
+from roofbench.benchmark.analysis.published import PUBLISHED, Comparison, OursRow
+from roofbench.benchmark.analysis.report_data import (
     CostPoint,
     Error,
     Overlay,
@@ -18,8 +17,9 @@ from roofbench.reports.report_data import (
     SizeBin,
     SizeCurve,
 )
-from roofbench.reports.scene_picture import scene_picture
-from roofbench.reports.tables import Cell, Entry, Leaderboard
+from roofbench.benchmark.analysis.results import Cell, Entry, Leaderboard
+from roofbench.benchmark.execution.scene_picture import scene_picture
+from roofbench.evaluators.threshold_free.indices import INDICES
 from roofbench.scenes.builtin import hamlet
 
 MAIN = tuple(index for index in INDICES if index.main)

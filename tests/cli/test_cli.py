@@ -274,12 +274,12 @@ def test_the_folder_for_results_is_checked_before_the_runs(cli, misbehaving, tmp
 
 def test_files_are_written_before_a_table_that_nobody_reads(cli, misbehaving, tmp_path, monkeypatch):
     from roofbench.cli import sweep
-    from roofbench.reports.tables import Leaderboard
+    from roofbench.reports import leaderboard_text
 
     def closed(*_):
         raise BrokenPipeError
 
-    monkeypatch.setattr(Leaderboard, "print", closed)
+    monkeypatch.setattr(leaderboard_text, "print_leaderboard", closed)
     monkeypatch.setattr(sweep, "_print", closed)
     for words in (
         ("run", "hamlet", "-d", misbehaving, "-j", 0, "-o", "out"),

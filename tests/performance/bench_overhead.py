@@ -20,7 +20,7 @@ from roofbench.benchmark.analysis.sweep import axis_of, make_sweep, sweep_table
 from roofbench.benchmark.execution.runner import Execution, run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.store.writer import Store
-from roofbench.benchmark.suite import Entrant, Suite
+from roofbench.benchmark.suite import DetectorEntry, Suite
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 
@@ -88,7 +88,7 @@ def main():
         plugin.write_text(DETECTOR)
         detector = make_detector(f"{plugin}:Busy", {"seconds": seconds})
         scenes = tuple(SceneRecipe.of_preset("hamlet", seed=seed) for seed in range(10))
-        suite = Suite("overhead", scenes, (Entrant(detector),), (make_evaluator("threshold-free"),))
+        suite = Suite("overhead", scenes, (DetectorEntry(detector),), (make_evaluator("threshold-free"),))
         with Store(Path(folder) / "a.sqlite") as store:
             wall, cpu, started = time.perf_counter(), cpu_seconds(), own()
             sweep = make_sweep(suite, [axis_of(f"{name}=1,2,3,4,5") for name in "abcde"], store)

@@ -24,7 +24,7 @@ from roofbench.benchmark.execution.tasks import Cost, Outcome, Score
 from roofbench.benchmark.execution.worker import describe, machine_facts
 from roofbench.benchmark.identity.keys import SourceClosure
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
-from roofbench.benchmark.plan import Judge
+from roofbench.benchmark.plan import KeyedEvaluator
 from roofbench.benchmark.store.records import RunIdentity
 from roofbench.benchmark.store.writer import Store
 from roofbench.reports.html_report import html_report
@@ -35,7 +35,7 @@ RUNS, DETECTORS, VARIANTS = 10_000, 10, 7
 
 def outcomes(scene, number):
     """Return what one detector finds, in a few variants that the scenes take in turns."""
-    judge = Judge.of(rb.make_evaluator("threshold-free"))
+    judge = KeyedEvaluator.of(rb.make_evaluator("threshold-free"))
     rng = np.random.default_rng(number)
     found = []
     for _ in range(VARIANTS):

@@ -19,7 +19,7 @@ from roofbench.benchmark.execution.runner import Execution, run_plan
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store
-from roofbench.benchmark.suite import Entrant, Suite, named_suite
+from roofbench.benchmark.suite import DetectorEntry, Suite, named_suite
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 
@@ -33,7 +33,7 @@ def values_of(suite, store, jobs=1):
     """Run a suite and return its index values by scene and seed."""
     plan = make_plan(suite, store)
     rows = run_plan(plan, store, execution=Execution(jobs=jobs)).ok
-    values = store.index_values([row.id for row in rows], plan.judges[0].key)
+    values = store.index_values([row.id for row in rows], plan.evaluators[0].key)
     return {(row.scene, row.seed): values[row.id] for row in rows}
 
 
@@ -45,7 +45,7 @@ def verdicts(before, after):
 def stochastic(store):
     scenes = named_suite("gate").scenes
     seeds = tuple(range(5 * (CANDIDATES + 1)))
-    found = values_of(Suite("mpp", scenes, (Entrant(make_detector("mpp"), seeds),), (EVALUATOR,)), store)
+    found = values_of(Suite("mpp", scenes, (DetectorEntry(make_detector("mpp"), seeds),), (EVALUATOR,)), store)
 
     def chains(chosen):
         return {(scene.name, seed): found[scene.name, seed] for scene in scenes for seed in chosen}
@@ -67,7 +67,7 @@ def stochastic(store):
 
 def deterministic(folder):
     recipes = tuple(SceneRecipe.of_preset("hamlet", seed=seed) for seed in range(CANDIDATES * SCENES))
-    suite = Suite("ndsm", recipes, (Entrant(make_detector("ndsm")),), (EVALUATOR,))
+    suite = Suite("ndsm", recipes, (DetectorEntry(make_detector("ndsm")),), (EVALUATOR,))
     sides = []
     for jobs in (1, 2):
         with Store(folder / f"{jobs}.sqlite") as store:

@@ -56,15 +56,15 @@ def values():
     return np.random.default_rng(3).uniform(0.6, 0.95, 16)
 
 
-def verdicts(result):
-    return {verdict.verdict for verdict in result.verdicts}
+def conclusions(result):
+    return {conclusion.conclusion for conclusion in result.conclusions}
 
 
 def test_the_same_results_are_equal_fifty_times_of_fifty():
     for repeat in range(50):
         values = np.random.default_rng(repeat).uniform(0.6, 0.95, 12)
         result = gate(measured(values), measured(values), 12)
-        assert verdicts(result) == {"equal"}
+        assert conclusions(result) == {"equal"}
         assert result.exit_code == 0
 
 
@@ -99,43 +99,43 @@ def test_scatter_over_seeds_is_told_apart_from_scatter_over_scenes(values):
     rng = np.random.default_rng(6)
     before, after = (measured(values, seeds=seeds, noise=0.05, rng=rng) for seeds in ((0, 1, 2), (3, 4, 5)))
     result = gate(before, after, 16)
-    assert verdicts(result) == {"undecided"}
+    assert conclusions(result) == {"undecided"}
     assert all(
-        re.search(r"d: seeds make \d+ % of the scatter of .*: more narrow it", verdict.note)
-        for verdict in result.verdicts
+        re.search(r"d: seeds make \d+ % of the scatter of .*: more narrow it", conclusion.note)
+        for conclusion in result.conclusions
     )
     steady = rng.normal(0, 0.05, 16)  # the change works differently on every scene, seeds hardly matter
     before = measured(values, seeds=(0, 1, 2), noise=0.001, rng=rng)
     after = measured(values + steady, seeds=(3, 4, 5), noise=0.001, rng=rng)
-    assert {verdict.note for verdict in gate(before, after, 16).verdicts} == {""}
+    assert {conclusion.note for conclusion in gate(before, after, 16).conclusions} == {""}
 
 
 def test_a_planted_drop_is_found(values):
     result = gate(measured(values), measured(values, shift=0.03), 16)
-    assert verdicts(result) == {"worse"}
+    assert conclusions(result) == {"worse"}
     assert result.exit_code == 1
-    assert all(verdict.effect == pytest.approx(-0.03) for verdict in result.verdicts)
+    assert all(conclusion.effect == pytest.approx(-0.03) for conclusion in result.conclusions)
 
 
 def test_a_gain_is_better_and_passes(values):
     result = gate(measured(values, shift=0.03), measured(values), 16)
-    assert (verdicts(result), result.exit_code) == ({"better"}, 0)
+    assert (conclusions(result), result.exit_code) == ({"better"}, 0)
 
 
 def test_a_drop_within_the_margin_is_none(values):
     result = gate(measured(values), measured(values, shift=0.004), 16)
-    assert (verdicts(result), result.exit_code) == ({"equal"}, 0)
+    assert (conclusions(result), result.exit_code) == ({"equal"}, 0)
 
 
 def test_noise_that_allows_both_is_undecided(values):
     noisy = measured(values, noise=0.1, rng=np.random.default_rng(5))
-    assert "undecided" in verdicts(gate(measured(values), noisy, 16))
+    assert "undecided" in conclusions(gate(measured(values), noisy, 16))
 
 
 def test_five_scenes_are_not_measurable_and_exit_4(values):
     result = gate(measured(values[:5]), measured(values[:5], shift=0.5), 5)
-    assert (verdicts(result), result.exit_code) == ({"not measurable"}, 4)
-    assert "d: 5 indices at level 0.01 need 10 scenes where both sides are defined, not 5" in result.verdicts[0].note
+    assert (conclusions(result), result.exit_code) == ({"not measurable"}, 4)
+    assert "d: 5 indices at level 0.01 need 10 scenes where both sides are defined, not 5" in result.conclusions[0].note
 
 
 def test_a_run_that_fails_now_is_a_regression(values):
@@ -149,9 +149,9 @@ def test_an_index_that_became_undefined_is_told(values):
     before = measured(values)
     lost = {**before.runs["s-2", 0], "geometric.rmse": None}
     result = gate(before, replace(before, runs={**before.runs, ("s-2", 0): lost}), 16)
-    (verdict,) = [verdict for verdict in result.verdicts if verdict.index.key == "geometric.rmse"]
-    assert verdict.scenes == 15
-    assert "undefined for the candidate on 1 scenes" in verdict.note
+    (conclusion,) = [conclusion for conclusion in result.conclusions if conclusion.index.key == "geometric.rmse"]
+    assert conclusion.scenes == 15
+    assert "undefined for the candidate on 1 scenes" in conclusion.note
 
 
 def test_holm_makes_one_chance_finding_among_many_harmless(values):
@@ -298,14 +298,14 @@ def test_run_time_is_compared_side_by_side(monkeypatch, tmp_path, misbehaving):
     scenes = {f"hamlet-{n}": BaselineScene(SceneRecipe.of_preset("hamlet", seed=n), "") for n in range(2)}
     recipe = PluginRecipe(misbehaving, {"seconds": 0.001})
     one = replace(baseline(measured([0.5]), 1), scenes=scenes, detectors={"d": Measured(recipe, (0,), {})})
-    (verdict,) = timing.time_side_by_side(one, one, repeats=1)
-    assert (verdict.verdict, verdict.scenes) == ("not measurable", 2)
-    assert "run time needs 6 scenes" in verdict.note
-    assert 0.05 < verdict.candidate < 20
+    (conclusion,) = timing.time_side_by_side(one, one, repeats=1)
+    assert (conclusion.conclusion, conclusion.scenes) == ("not measurable", 2)
+    assert "run time needs 6 scenes" in conclusion.note
+    assert 0.05 < conclusion.candidate < 20
 
 
 @pytest.mark.parametrize(
-    ("ratios", "verdict"),
+    ("ratios", "conclusion"),
     [
         ([1.3, 1.4, 1.25, 1.5, 1.35, 1.45], "worse"),
         ([0.7] * 6, "better"),
@@ -313,11 +313,11 @@ def test_run_time_is_compared_side_by_side(monkeypatch, tmp_path, misbehaving):
         ([1.3], "not measurable"),
     ],
 )
-def test_run_time_has_verdicts_of_its_own(ratios, verdict):
+def test_run_time_has_verdicts_of_its_own(ratios, conclusion):
     from roofbench.benchmark.analysis import timing
 
-    found = timing._verdict("d", [np.log(ratio) for ratio in ratios], 0.1, 0.05)
-    assert found.verdict == verdict
+    found = timing._conclusion("d", [np.log(ratio) for ratio in ratios], 0.1, 0.05)
+    assert found.conclusion == conclusion
     assert found.candidate == pytest.approx(np.exp(np.mean(np.log(ratios))))
 
 

@@ -126,7 +126,7 @@ def test_plots_are_written(folder):
         (("plot", "scene", "castle", "-o", "x.png", "--store", "runs.sqlite"), "no run on 'castle'"),
         (("plot", "scene", "hamlet-*", "-o", "x.png", "--store", "runs.sqlite"), "several scenes match"),
         (("plot", "sweep", "missing.csv", "-o", "x.png"), "no such sweep table"),
-        (("plot", "gate", "runs.sqlite", "-o", "x.png"), "no result of the gate"),
+        (("plot", "gate", "runs.sqlite", "-o", "x.png"), "not a result of the gate"),
         (("plot", "sweep", "--axis", "width", "-o", "x.png", "--store", "runs.sqlite"), "no axis 'width'"),
     ],
 )

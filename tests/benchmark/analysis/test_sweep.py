@@ -8,7 +8,7 @@ from roofbench.benchmark.analysis.sweep import Axis, axis_of, break_downs, make_
 from roofbench.benchmark.execution.runner import Execution
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.store.writer import Store
-from roofbench.benchmark.suite import Entrant, Suite
+from roofbench.benchmark.suite import DetectorEntry, Suite
 from roofbench.cli.main import app
 from roofbench.core.errors import ParameterError
 from roofbench.detectors.registry import make_detector
@@ -20,7 +20,7 @@ HERE = Execution(jobs=0)
 @pytest.fixture
 def suite(misbehaving):
     scenes = tuple(SceneRecipe.of_preset("hamlet", seed=seed) for seed in (1, 2, 3))
-    return Suite("s", scenes, (Entrant(make_detector(misbehaving), (0, 1)),), (make_evaluator("threshold-free"),))
+    return Suite("s", scenes, (DetectorEntry(make_detector(misbehaving), (0, 1)),), (make_evaluator("threshold-free"),))
 
 
 @pytest.fixture

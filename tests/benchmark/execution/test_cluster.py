@@ -15,7 +15,7 @@ from roofbench.benchmark.execution.runner import Execution, run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store
-from roofbench.benchmark.suite import Entrant, Suite
+from roofbench.benchmark.suite import DetectorEntry, Suite
 from roofbench.core.errors import InputError
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
@@ -28,14 +28,16 @@ pytestmark = pytest.mark.filterwarnings("ignore")  # warnings of Dask and Tornad
 def suite(misbehaving):
     scenes = tuple(SceneRecipe.of_preset("hamlet", seed=seed) for seed in (1, 2))
     good, failing = make_detector(misbehaving), make_detector(misbehaving, {"mode": "leaves", "only_on": "hamlet-2"})
-    return Suite("s", scenes, (Entrant(good, (0, 1, 2)), Entrant(failing)), (make_evaluator("threshold-free"),))
+    return Suite(
+        "s", scenes, (DetectorEntry(good, (0, 1, 2)), DetectorEntry(failing)), (make_evaluator("threshold-free"),)
+    )
 
 
 def run(suite, path, execution):
     with Store(path) as store:
         plan = make_plan(suite, store)
         result = run_plan(plan, store, execution=execution)
-        values = store.index_values([row.id for row in result.ok], plan.judges[0].key)
+        values = store.index_values([row.id for row in result.ok], plan.evaluators[0].key)
         return {row.key: (row.status, row.reason, row.detected, values.get(row.id)) for row in result.rows}
 
 
@@ -51,7 +53,7 @@ def test_a_local_cluster_gives_the_same_results(suite, tmp_path):
 
 
 def test_limits_hold_on_a_cluster(suite, tmp_path, misbehaving):
-    hanging = replace(suite, entrants=(Entrant(make_detector(misbehaving, {"mode": "hangs"})),))
+    hanging = replace(suite, detectors=(DetectorEntry(make_detector(misbehaving, {"mode": "hangs"})),))
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
     ) as cluster:
@@ -78,7 +80,7 @@ def test_a_worker_killed_in_mid_run_does_not_stop_the_sweep(suite, tmp_path, mis
         processes += [start(*map(str, worker)) for _ in range(2)]
         with distributed.Client(address, timeout="30s") as client:
             client.wait_for_workers(2, timeout=60)
-        slow = replace(suite, entrants=(Entrant(make_detector(misbehaving, {"seconds": 0.5}), tuple(range(6))),))
+        slow = replace(suite, detectors=(DetectorEntry(make_detector(misbehaving, {"seconds": 0.5}), tuple(range(6))),))
         victim = processes[1]
         killed = []
 

@@ -11,7 +11,7 @@ from roofbench.benchmark.identity.keys import source_closure
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.plan import make_plan, plan_content, suite_from_content
 from roofbench.benchmark.store.writer import Store
-from roofbench.benchmark.suite import Entrant, Suite
+from roofbench.benchmark.suite import DetectorEntry, Suite
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 from roofbench.scenes.builtin import hamlet
@@ -25,7 +25,7 @@ def suite(misbehaving):
     return Suite(
         "pair",
         tuple(SceneRecipe.of_preset("hamlet", seed=seed) for seed in (1, 2)),
-        (Entrant(fails, (0, 1)), Entrant(good)),
+        (DetectorEntry(fails, (0, 1)), DetectorEntry(good)),
         (make_evaluator("threshold-free"),),
     )
 
@@ -34,7 +34,7 @@ def run(suite, path, *, jobs=0, overwrite="missing", only_failed=False, **limits
     with Store(path) as store:
         plan = make_plan(suite, store, overwrite=overwrite, only_failed=only_failed)
         result = run_plan(plan, store, execution=Execution(jobs=jobs, limits=Limits(**limits)), overwrite=overwrite)
-        judge = plan.judges[0]
+        judge = plan.evaluators[0]
         return plan, result, store.index_values([row.id for row in result.ok], judge.key)
 
 
@@ -91,7 +91,7 @@ def test_results_do_not_depend_on_the_executor(suite, tmp_path, jobs):
 def test_a_suite_is_resumed_from_the_store(suite, tmp_path):
     restored = suite_from_content(plan_content(suite))
     assert restored.scenes == suite.scenes
-    assert restored.entrants == suite.entrants
+    assert restored.detectors == suite.detectors
     assert restored.evaluators == suite.evaluators
 
 
@@ -100,7 +100,7 @@ def test_the_plan_says_what_differs_from_the_stored_run(suite, tmp_path, monkeyp
     source_closure.cache_clear()
     monkeypatch.setattr(keys, "_version", lambda top: "0.0.1" if top == "numpy" else None)
     with Store(tmp_path / "a.sqlite") as store:
-        why = {run.why for run in make_plan(replace(suite, entrants=suite.entrants[1:]), store).runs}
+        why = {run.why for run in make_plan(replace(suite, detectors=suite.detectors[1:]), store).runs}
     source_closure.cache_clear()
     (first, _) = sorted(why)
     assert re.search(r"package numpy changed \([\d.]+ to 0\.0\.1\); package shapely gone.* since run \d", first)

@@ -5,7 +5,7 @@ from roofbench.benchmark.identity.keys import source_closure
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe, label_of
 from roofbench.benchmark.plan import plan_content, suite_from_content
 from roofbench.benchmark.store.records import RunIdentity
-from roofbench.benchmark.suite import Entrant, Suite
+from roofbench.benchmark.suite import DetectorEntry, Suite
 from roofbench.detectors.registry import make_detector
 
 SCENE = SceneRecipe.of_preset("hamlet", seed=1)
@@ -40,6 +40,6 @@ def test_a_task_carries_the_number_of_threads_to_another_process():
 
 
 def test_a_resumed_plan_keeps_the_number_of_threads():
-    suite = Suite("one", (SCENE,), (Entrant(make_detector("mpp[threads=2]"), (0,)),), ())
-    (entrant,) = suite_from_content(plan_content(suite)).entrants
-    assert entrant.detector.threads == 2
+    suite = Suite("one", (SCENE,), (DetectorEntry(make_detector("mpp[threads=2]"), (0,)),), ())
+    (entry,) = suite_from_content(plan_content(suite)).detectors
+    assert entry.detector.threads == 2

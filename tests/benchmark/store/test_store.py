@@ -12,7 +12,7 @@ from roofbench.benchmark.execution.tasks import Outcome
 from roofbench.benchmark.execution.worker import execute
 from roofbench.benchmark.identity.keys import SourceClosure
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
-from roofbench.benchmark.plan import Judge
+from roofbench.benchmark.plan import KeyedEvaluator
 from roofbench.benchmark.store.records import RunIdentity
 from roofbench.benchmark.store.schema import MIGRATIONS, VERSION
 from roofbench.benchmark.store.writer import Store
@@ -29,7 +29,7 @@ def store(tmp_path):
 
 @pytest.fixture
 def judge():
-    return Judge.of(make_evaluator("threshold-free"))
+    return KeyedEvaluator.of(make_evaluator("threshold-free"))
 
 
 def identity(seed=0, **parameters):
@@ -104,7 +104,7 @@ def test_every_part_of_the_identity_changes_the_key():
 
 def test_a_new_evaluator_uses_the_stored_detections(store, outcome):
     run_id = store.record(identity(), outcome, version="1")
-    other = Judge.of(make_evaluator("threshold-free[matching=overlap]"))
+    other = KeyedEvaluator.of(make_evaluator("threshold-free[matching=overlap]"))
     assert score_stored(store, run_id, (other,)) == 1
     assert store.evaluation(run_id, other.evaluator, other.key) is not None
     assert [recipe.parameters["matching"] for _, recipe in store.evaluators()] == ["nearest", "overlap"]

@@ -1,6 +1,6 @@
 """The papers' rows, and what can be said of their tables."""
 
-from roofbench.reports.published import PUBLISHED, checks
+from roofbench.benchmark.analysis.published import PUBLISHED, checks
 
 CHECKS = {(check.source, check.rule): check for check in checks()}
 

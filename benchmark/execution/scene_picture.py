@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Bitmap
 
-from ..scenes.geodata.raster import Grid, Image
-from ..scenes.geodata.surfaces import highest_surface
-from ..scenes.scene import Scene
+from ...scenes.geodata.raster import Grid, Image
+from ...scenes.geodata.surfaces import highest_surface
+from ...scenes.scene import Scene
 
 __all__ = ["ScenePicture", "scene_picture"]
 

@@ -25,11 +25,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..evaluators.base import Index
-from .gate_text import GateResult
+from ...evaluators.base import Index
+from ..execution.scene_picture import ScenePicture
 from .published import Comparison
-from .scene_picture import ScenePicture
-from .tables import Leaderboard
+from .results import GateResult, Leaderboard
 
 __all__ = [
     "CostPoint",

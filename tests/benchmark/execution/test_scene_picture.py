@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image as Bitmap
 
-from roofbench.reports.scene_picture import ScenePicture, scene_picture
+from roofbench.benchmark.execution.scene_picture import ScenePicture, scene_picture
 from roofbench.scenes.builtin import hamlet
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid, Image

@@ -1,0 +1,144 @@
+"""Leaderboards as text: for terminals, Markdown files and CSV files.
+
+An undefined value is an empty cell. A mean that leaves scenes out, because the index is undefined there, is followed by
+the number of its scenes as (n).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..benchmark.analysis.results import Entry, Leaderboard, UnsuccessfulRun
+from ..core.output import whole_file
+from .format import column_title, counted, interval_text, number_text
+from .tables import Column, Table, escaped_markdown
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = [
+    "leaderboard_caption",
+    "leaderboard_data",
+    "leaderboard_markdown",
+    "leaderboard_table",
+    "print_leaderboard",
+    "print_unsuccessful",
+    "write_leaderboards",
+]
+
+_FACTS = ("rank", "group", "detector", "parameters", "pooling", "scenes", "runs", "failed", "skipped")
+_COSTS = ("detected", "reference", "cpu_seconds", "peak_memory")
+
+
+def leaderboard_table(board: Leaderboard) -> Table:
+    """Return the table for people: values with few decimals, fractions in percent."""
+    grouped = any(entry.group for entry in board.entries)
+    columns = [
+        Column("rank", fixed=True),
+        *([Column("group", "left", fixed=True)] if grouped else []),
+        Column("detector", "left", fixed=True),
+        Column("over", "left", fixed=True),
+        Column("scenes", fixed=True),
+        *(Column(column_title(index)) for index in board.indices),
+        Column(f"{board.rank_by.symbol or board.rank_by.title} 95 %"),
+        *(Column(title) for title in ("objects", "CPU s", "MB")),
+    ]
+    return Table.of(columns, (_printed(board, entry, grouped=grouped) for entry in board.entries))
+
+
+def _printed(board: Leaderboard, entry: Entry, *, grouped: bool) -> list[str]:
+    scenes = str(entry.scenes) if entry.scenes == len(board.scenes) else f"{entry.scenes} of {len(board.scenes)}"
+    row = ["-" if entry.rank is None else str(entry.rank), *([entry.group] if grouped else [])]
+    row += [entry.label, entry.pooling, scenes]
+    for index in board.indices:
+        cell = entry.cells[index.key]
+        text = number_text(cell.value, index.unit)
+        partial = entry.pooling == "mean" and cell.scenes < entry.scenes
+        row.append(f"{text} ({cell.scenes})".strip() if partial else text)
+    ranked = entry.cells[board.rank_by.key]
+    row.append(interval_text(ranked.low, ranked.high, board.rank_by.unit))
+    row.append(f"{entry.detected}/{entry.reference}")
+    row += [number_text(entry.cpu_seconds, "s"), number_text(entry.peak_memory or None, "bytes")]
+    return row
+
+
+def leaderboard_data(board: Leaderboard) -> Table:
+    """Return the table for programs: fractions 0..1, metres; for each index its number of scenes and its interval."""
+    keys = [index.key for index in board.indices]
+    parts = [f"{key}:{part}" for key in keys for part in ("scenes", "low", "high")]
+    rows = []
+    for entry in board.entries:
+        cells = [entry.cells[key] for key in keys]
+        facts = {**vars(entry), "parameters": ",".join(f"{name}={value}" for name, value in entry.parameters.items())}
+        rows.append(
+            [
+                *(facts[name] for name in (*_FACTS, *_COSTS)),
+                *(cell.value for cell in cells),
+                *(part for cell in cells for part in (cell.scenes, cell.low, cell.high)),
+                board.evaluator,
+            ]
+        )
+    return Table.of((Column(name) for name in (*_FACTS, *_COSTS, *keys, *parts, "evaluator")), rows)
+
+
+def leaderboard_caption(board: Leaderboard) -> str:
+    """Return what the values are of: scenes, evaluator, index that ranks, and what the columns mean."""
+    shown = ", ".join(board.scenes[:4]) + (f" and {len(board.scenes) - 4} more" if len(board.scenes) > 4 else "")
+    return (
+        f"{counted(len(board.scenes), 'scene')} ({shown}); {board.evaluator}; ranked by {board.rank_by.title} "
+        f"({board.rank_by.symbol}, pooled); pooled: counts added over scenes, then the ratio; mean: mean over "
+        "scenes, (n) where it is defined in n of them only; empty: undefined"
+    )
+
+
+def leaderboard_markdown(board: Leaderboard) -> str:
+    """Return a Markdown section: caption, table, notes, failures and skips with their reasons."""
+    head = [
+        f"## {escaped_markdown(board.title)}",
+        f"{leaderboard_caption(board)}.",
+        leaderboard_table(board).to_markdown(),
+    ]
+    notes = [f"- {escaped_markdown(note)}" for note in board.notes]
+    notes += [
+        f"- {run.status}: {escaped_markdown(run.label)} on {escaped_markdown(run.scene)}, seed {run.seed}: "
+        f"{escaped_markdown(run.reason)}. Repeat: `{run.command}`"
+        for run in board.unsuccessful
+    ]
+    return "\n".join(["\n\n".join(head), *(["", *notes] if notes else []), ""])
+
+
+def print_leaderboard(board: Leaderboard, console: Console) -> None:
+    """Print a leaderboard to a terminal; its columns are spread over as many tables as the width needs."""
+    from rich.text import Text
+
+    console.print(Text(board.title, style="bold"))
+    console.print(Text(leaderboard_table(board).to_text(console.width)), soft_wrap=True)
+    console.print(Text(f"{leaderboard_caption(board)}."))
+    for note in board.notes:
+        console.print(Text(note))
+
+
+def print_unsuccessful(runs: Sequence[UnsuccessfulRun], console: Console) -> None:
+    """Print failures and skips, each with its reason and the command that repeats it."""
+    from rich.text import Text
+
+    for run in runs:
+        console.print(
+            Text.assemble(
+                (run.status, "red" if run.status == "failed" else "yellow"),
+                f" {run.label} on {run.scene}, seed {run.seed}: {run.reason}\n",
+                (f"  repeat: {run.command}", "dim"),
+            ),
+            soft_wrap=True,
+        )
+
+
+def write_leaderboards(folder: Path, boards: Sequence[Leaderboard]) -> None:
+    """Write one CSV and one Markdown file; a further evaluator gets files with its own name."""
+    for number, board in enumerate(boards):
+        name = "leaderboard" if number == 0 else f"leaderboard-{board.evaluator.partition(' ')[0]}"
+        for ending, text in (("csv", leaderboard_data(board).to_csv()), ("md", leaderboard_markdown(board))):
+            with whole_file(folder / f"{name}.{ending}", overwrite=True) as scratch:
+                scratch.write_text(text, encoding="utf-8")

@@ -1,0 +1,45 @@
+"""The table of a sweep as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..core.parameters import parameter_text
+from ..evaluators.base import Index
+from .format import column_title, interval_text, number_text
+from .tables import Column, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["sweep_table"]
+
+
+def sweep_table(table: pd.DataFrame, axes: Sequence[str], index: Index) -> Table:
+    """Return one row per detector and point: the mean of an index with its interval.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As `benchmark.analysis.sweep.run_sweep` returns it, of one evaluator.
+    axes : sequence of str
+        Columns of the varied parameters.
+    index : Index
+    """
+    columns = [
+        Column("detector", "left", fixed=True),
+        *(Column(name) for name in (*axes, column_title(index), "95 %", "scenes", "failed", "skipped")),
+    ]
+    rows = []
+    for row in table[table["index"] == index.key].to_dict("records"):
+        mean, low, high = (_known(row[name]) for name in ("mean", "low", "high"))
+        values = ["" if _known(row[name]) is None else parameter_text(row[name]) for name in axes]
+        shown = [number_text(mean, index.unit), interval_text(low, high, index.unit)]
+        rows.append([row["detector"], *values, *shown, *(row[name] for name in ("scenes", "failed", "skipped"))])
+    return Table.of(columns, rows)
+
+
+def _known(value: Any) -> Any:
+    """Return None for what pandas writes where there is no value."""
+    return None if value is None or value != value else value
