@@ -12,7 +12,7 @@ __all__ = ["FOLDER", "HOMES", "NAME", "VERSION"]
 
 NAME = __package__.partition(".")[0]
 FOLDER = Path(__file__).resolve().parents[1]
-VERSION = "0.1.0"
+VERSION = "0.2.0"
 
 #: Public name to the module that defines it.
 HOMES = {

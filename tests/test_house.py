@@ -7,6 +7,7 @@ import house
 import pytest
 
 import roofbench
+from roofbench.core.package import VERSION
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -80,4 +81,5 @@ def test_every_public_name_is_there():
 
 
 def test_the_version_is_said_once():
-    assert roofbench.__version__ == PROJECT["project"]["version"]
+    assert PROJECT["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "roofbench.core.package.VERSION"}
+    assert roofbench.__version__ == VERSION

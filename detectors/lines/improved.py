@@ -1,8 +1,8 @@
 """The detector `improved`: the line detector with texture, which tells buildings from trees of their height and colour.
 
 Source: Awrangjeb, Zhang & Fraser, "Automatic building detection in complex scenes: improved detector using texture",
-IAPRS XXXVIII-3/W22 (2011). The page docs/line-detectors.md tells how each open point of the print is read and what that
-costs.
+IAPRS XXXVIII-3/W22 (2011). The page docs/results/line-detectors.md lists how each open point of the print is read and
+what that reading costs.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Source: Awrangjeb, Ravanbakhsh & Fraser, "Automatic detection of residential buildings using LIDAR data and
 multispectral imagery", ISPRS Journal of Photogrammetry and Remote Sensing 65 (2010). The page
-docs/line-detectors.md tells how each open point of the print is read and what that costs.
+docs/results/line-detectors.md lists how each open point of the print is read and what that costs.
 """
 
 from __future__ import annotations

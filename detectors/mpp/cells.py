@@ -81,8 +81,8 @@ def cell_size(
     """Return the cell size in metres for a mean point spacing: 0.5 to 2 m in steps of 0.25.
 
     Half the spacing and 0.2 m, rounded up: at 3 points per m2 0.5 m, at 1 point 0.75 m. Cells that no point falls into
-    are filled from their neighbours, which costs less than what larger cells blur (docs/mpp.md). Squares of 4 m without
-    a point do not count as covered (water, a ragged border).
+    are filled from their neighbours, which costs less than what larger cells blur (docs/results/mpp.md). Squares of
+    4 m without a point do not count as covered (water, a ragged border).
     """
     coarse = Grid.covering(extent, 4.0)
     edges = [len(x) * part // workers.count for part in range(workers.count + 1)]

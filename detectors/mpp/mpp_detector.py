@@ -2,7 +2,7 @@
 
 After Yu, Li, Guan & Wang (2013), "A marked point process for automated building detection from lidar point-clouds",
 Remote Sensing Letters 4(11), 1127-1136: a valid sampler of a repaired model with roofs, texture and party walls
-(docs/mpp.md says what was changed and why). The algorithm as printed is the detector ``mpp-printed``.
+(docs/results/mpp.md says what was changed and why). The algorithm as printed is the detector ``mpp-printed``.
 """
 
 from __future__ import annotations

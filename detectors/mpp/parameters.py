@@ -1,7 +1,7 @@
 """The parameters of the detector ``mpp``.
 
 Each parameter names its source: an equation of Yu, Li, Guan & Wang (2013), or "roofbench" for what the repaired model
-adds (docs/mpp.md gives the reasons and the measured effect of each).
+adds (docs/results/mpp.md gives the reasons and the measured effect of each).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The detector ``mpp-printed``: the algorithm of Yu, Li, Guan & Wang (2013) as it is printed.
 
 "A marked point process for automated building detection from lidar point-clouds", Remote Sensing Letters 4(11),
-1127-1136. The print gives no value of any parameter but k0 = 1; the values here are readings (docs/mpp.md).
+1127-1136. The print gives no value of any parameter but k0 = 1; the values here are readings (docs/results/mpp.md).
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ tau
     Standard deviation of heights around the roof, metres, not less than the least one that a real roof has.
 
 A roof is chosen by its Gaussian log-likelihood with tau profiled, less a price for each number it has more than a flat
-one. Source of the flat one: Yu, Li, Guan & Wang (2013), equation 1; the others are ours (docs/mpp.md).
+one. Source of the flat one: Yu, Li, Guan & Wang (2013), equation 1; the others are ours (docs/results/mpp.md).
 """
 
 from __future__ import annotations

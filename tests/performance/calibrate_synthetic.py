@@ -1,7 +1,8 @@
 """Compare synthetic scenes with the two real ones, by the same measurements on both.
 
-Run by hand: ``python tests/performance/calibrate_synthetic.py [PICTURE.png]`` prints the table of docs/synthetic.md and
-draws its picture. The real scenes are looked for beside the repository (``../shared/scenes``) or in ROOFBENCH_SHARED.
+Run by hand: ``python tests/performance/calibrate_synthetic.py [PICTURE.png]`` prints the table of
+docs/results/synthetic.md and draws its picture.
+The real scenes are looked for beside the repository (``../shared/scenes``) or in ROOFBENCH_SHARED.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""The studies behind docs/line-detectors.md: pattern of results, what is lost where, ablation, sensitivity, pictures.
+"""The studies of docs/results/line-detectors.md: pattern of results, losses, ablation, sensitivity, pictures.
 
 Run by hand: ``python tests/performance/study_lines.py STUDY [--seeds 1,2,3]``; ``--help`` names the studies.
 

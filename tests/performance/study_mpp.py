@@ -1,4 +1,4 @@
-"""How the result of the marked point process moves: the tables and figures of docs/mpp.md.
+"""How the result of the marked point process moves: the tables and figures of docs/results/mpp.md.
 
 Run by hand: ``python tests/performance/study_mpp.py ablation --folders delft,ign`` and the same with ``sensitivity``,
 ``points``, ``seeds``, ``ground``, ``detectors``, ``shapes`` or ``pictures``; figures go to docs/images.

@@ -1,4 +1,4 @@
-"""How ndsm's quality depends on its cues, its parameters and the points it is given: the tables of docs/ndsm.md.
+"""How the quality of ndsm depends on its cues, its parameters and the points: the tables of docs/results/ndsm.md.
 
 Run by hand on scene folders: ``python tests/performance/study_ndsm.py delft ign [--tables cues,parameters,points]``.
 

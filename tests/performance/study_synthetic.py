@@ -1,4 +1,4 @@
-"""Pictures and difficulty curves of docs/synthetic.md.
+"""Pictures and difficulty curves of docs/results/synthetic.md.
 
 ``python tests/performance/study_synthetic.py pictures FOLDER [PRESET ...]`` draws presets; ``... curves FILE.png``
 prints and plots how the plain detector fares as one knob is turned, over ten seeds; ``... presets`` how on each preset.
