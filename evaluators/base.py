@@ -2,114 +2,37 @@
 
 Nouns
 -----
-index
-    One number that an evaluator reports, declared as `Index` with symbol, direction, unit and source.
-tallies
-    Counts and sums of one evaluation (TP, areas in m2, sums of squared distances) from which indices follow, and which
-    add up over scenes.
-samples
-    Values of one evaluation that are kept one by one (IoU of each pair), because a median cannot be added up.
+evaluator
+    A way of comparing two footprint sets. It declares its whole vocabulary: indices with their formulas, verdict
+    kinds, the index that ranks and those that are gated. Tables, maps, reports and the gate read this declaration.
 evaluation
-    Tallies, samples and a verdict per object. Pooling adds tallies, joins samples and derives the indices anew.
+    The result of one comparison: tallies, from which every index follows, and a verdict for each object. Pooling adds
+    the tallies of several evaluations and derives the indices anew.
 """
 
 from __future__ import annotations
 
+import functools
+import operator
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..core.errors import InputError
+from ..core.errors import InputError, UnknownNameError
 from ..core.parameters import Parameterised
+from ..core.registry import nearest_hint
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.geodata.raster import Grid
+from .index import Better, Curve, Index, IndexGroup
+from .tally import Tallies
+from .verdict_table import Measure, Side, VerdictKind, Verdicts
 
 if TYPE_CHECKING:
-    import pandas as pd
     from shapely import Geometry
 
-__all__ = ["Better", "Evaluation", "Evaluator", "Index", "Samples", "Tallies", "Verdicts", "mean_values"]
-
-#: Which way an index improves.
-Better: TypeAlias = Literal["higher", "lower", "neither"]
-#: What adds up over scenes, and what is kept one by one.
-Tallies: TypeAlias = Mapping[str, float]
-Samples: TypeAlias = Mapping[str, NDArray[np.float64]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Index:
-    """One reported number.
-
-    Attributes
-    ----------
-    key : str
-        Dotted name in JSON, tables and the store: ``"object.quality"``.
-    title, symbol : str
-        Name in words and the paper's symbol: ``"quality"``, ``"Q_l"``.
-    better : {"higher", "lower", "neither"}
-    unit : str
-        ``"fraction"`` (printed as percent), ``"ratio"``, ``"m"``, ``"px"`` or ``"count"``.
-    range : tuple of float
-        Lowest and highest value it can take.
-    meaning, source : str
-        The formula in words, and where it is defined.
-    main : bool
-        Whether it is one of the evaluator's principal indices, shown in every table; the others are variants.
-    """
-
-    key: str
-    title: str
-    symbol: str
-    better: Better
-    unit: str
-    range: tuple[float, float]
-    meaning: str
-    source: str
-    main: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class Verdicts:
-    """Why each object is right or wrong: one row per detection and per reference.
-
-    Columns ``id``, ``verdict``, ``partner``, ``distance``, ``overlap_area``, ``iou``, ``rmse``, ``reason``,
-    ``geometry`` (shapely), further ones as the evaluator needs. They become data frames when somebody asks: a sweep
-    stores the verdicts of thousands of runs without any.
-
-    Attributes
-    ----------
-    detection_columns, reference_columns : mapping of str to array, masked array or list
-    """
-
-    detection_columns: Mapping[str, Any]
-    reference_columns: Mapping[str, Any]
-
-    @cached_property
-    def detections(self) -> pd.DataFrame:
-        """One row per detection; whole numbers that are masked are <NA>."""
-        return _frame(self.detection_columns)
-
-    @cached_property
-    def references(self) -> pd.DataFrame:
-        """One row per reference; see `detections`."""
-        return _frame(self.reference_columns)
-
-
-def _frame(columns: Mapping[str, Any]) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.DataFrame(
-        {
-            name: pd.arrays.IntegerArray(column.data, np.ma.getmaskarray(column)) if np.ma.isMA(column) else column
-            for name, column in columns.items()
-        }
-    )
+__all__ = ["Better", "Evaluation", "Evaluator", "Index", "Verdicts", "mean_values"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -119,37 +42,49 @@ class Evaluation:
     Attributes
     ----------
     evaluator : Evaluator
-    tallies : mapping of str to float
-    samples : mapping of str to ndarray
-    values : mapping of str to float or None
-        Every index of the evaluator by its key; None where it is undefined (0/0).
+    tallies : Tallies
     notes : tuple of str
         What a reader must know: objects left out, repairs, how RMSE was measured.
+    find_verdicts : callable, optional
+        Makes the verdicts when they are asked for; a sweep of thousands of runs may never ask.
     """
 
     evaluator: Evaluator
     tallies: Tallies
-    samples: Samples = field(default_factory=dict)
-    values: Mapping[str, float | None] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    find_verdicts: Callable[[], Verdicts] | None = field(default=None, repr=False)
 
-    @property
+    @cached_property
+    def values(self) -> Mapping[str, float | None]:
+        """Every index by its key; None where it is undefined (0/0)."""
+        return {index.key: index.formula(self.tallies) for index in self.evaluator.indices}
+
+    @cached_property
     def verdicts(self) -> Verdicts | None:
         """A verdict with its reason for every object; None of a pooled evaluation."""
-        return None
+        return None if self.find_verdicts is None else self.find_verdicts()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what JSON holds: nested by the parts of the index keys, ``null`` where undefined."""
-        nested: dict[str, Any] = {"evaluator": self.evaluator.name, "parameters": self.evaluator.values()}
-        for key, value in self.values.items():
-            *groups, name = key.split(".")
-            place = nested
-            for group in groups:
-                place = place.setdefault(group, {})
-            place[name] = value
-        nested["tallies"] = dict(self.tallies)
-        nested["notes"] = list(self.notes)
-        return nested
+        """Return what JSON holds: nested by the parts of the names, ``null`` where undefined.
+
+        Counts come first, then the index groups, then the other tallies.
+        """
+        content: dict[str, Any] = {"evaluator": self.evaluator.name, "parameters": self.evaluator.values()}
+        tallies = self.tallies.to_dict()
+        counts = {key: value for key, value in tallies.items() if key.startswith("counts.")}
+        others = {key: value for key, value in tallies.items() if key not in counts}
+        for key, value in [*counts.items(), *self.values.items()]:
+            _place(content, key, value)
+        content["tallies"] = others
+        content["notes"] = list(self.notes)
+        return content
+
+
+def _place(content: dict[str, Any], key: str, value: Any) -> None:
+    *groups, name = key.split(".")
+    for group in groups:
+        content = content.setdefault(group, {})
+    content[name] = value
 
 
 class Evaluator(Parameterised, ABC):
@@ -158,12 +93,70 @@ class Evaluator(Parameterised, ABC):
     Attributes
     ----------
     name : str
+    groups : tuple of IndexGroup classes
+        What it reports, in order; `indices` follows from them.
     indices : tuple of Index
-        What it reports, in order.
+        Every index; declared directly only where there are no groups.
+    tallies_type : type of Tallies
+    evaluation_type : type of Evaluation
+    ranked_by : str
+        Key of the index that ranks; the first index with a direction where it is empty.
+    gated_by : tuple of str
+        Keys of the indices that are gated; every principal index with a direction where it is empty.
+    swept_by : tuple of str
+        Keys of the indices that sensitivity plots show; the one that ranks where it is empty.
+    verdict_kinds : tuple of VerdictKind
+        In the order of legends; empty where it gives no verdicts.
+    measures : tuple of Measure
+        Further columns of its verdict tables.
+    curves : tuple of Curve
+
+    Examples
+    --------
+    An evaluator that compares the numbers of footprints:
+
+    >>> from dataclasses import dataclass
+    >>> from .index import index, ratio
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Counts(Tallies):
+    ...     detected: int = 0
+    ...     reference: int = 0
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Numbers(IndexGroup):
+    ...     key = "number"
+    ...     title = "numbers"
+    ...     share: float | None = index(
+    ...         "share", "neither", "ratio", lambda t: ratio(t.detected, t.reference), meaning="|D|/|R|"
+    ...     )
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Numbering(Evaluator):
+    ...     name = "numbering"
+    ...     groups = (Numbers,)
+    ...     tallies_type = Counts
+    ...
+    ...     def evaluate(self, detected, reference, *, area=None, grid=None):
+    ...         return self.summarise(Counts(detected=len(detected), reference=len(reference)))
+    >>> one, two = Footprints.empty(), Footprints.from_rectangles([[[0, 0], [1, 0], [1, 1], [0, 1]]])
+    >>> Numbering().evaluate(two, two).values, Numbering().evaluate(two, one).values
+    ({'number.share': 1.0}, {'number.share': None})
     """
 
     name: ClassVar[str]
-    indices: ClassVar[tuple[Index, ...]]
+    groups: ClassVar[tuple[type[IndexGroup], ...]] = ()
+    indices: ClassVar[tuple[Index, ...]] = ()
+    tallies_type: ClassVar[type[Tallies]]
+    evaluation_type: ClassVar[type[Evaluation]] = Evaluation
+    ranked_by: ClassVar[str] = ""
+    gated_by: ClassVar[tuple[str, ...]] = ()
+    swept_by: ClassVar[tuple[str, ...]] = ()
+    verdict_kinds: ClassVar[tuple[VerdictKind, ...]] = ()
+    measures: ClassVar[tuple[Measure, ...]] = ()
+    curves: ClassVar[tuple[Curve, ...]] = ()
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "groups" in cls.__dict__:
+            cls.indices = tuple(index for group in cls.groups for index in group.indices())
 
     @abstractmethod
     def evaluate(
@@ -186,29 +179,81 @@ class Evaluator(Parameterised, ABC):
             Grid of the orthoimage, for indices counted in pixels.
         """
 
-    @abstractmethod
-    def summarise(self, tallies: Tallies, samples: Samples, notes: Sequence[str] = ()) -> Evaluation:
-        """Return the evaluation that follows from tallies and samples (of one scene, or added up over several)."""
+    def summarise(
+        self,
+        tallies: Tallies,
+        notes: Sequence[str] = (),
+        *,
+        find_verdicts: Callable[[], Verdicts] | None = None,
+    ) -> Evaluation:
+        """Return the evaluation that follows from tallies (of one scene, or added up over several)."""
+        return self.evaluation_type(
+            evaluator=self,
+            tallies=tallies,
+            notes=(*notes, *self.notes_of(tallies)),
+            find_verdicts=find_verdicts,
+        )
+
+    def notes_of(self, tallies: Any) -> Sequence[str]:
+        """Return what a reader must know and the tallies say, such as how many objects were left out."""
+        return ()
 
     def pool(self, evaluations: Iterable[Evaluation]) -> Evaluation:
         """Add up several evaluations of this evaluator: counts and areas first, then the ratios."""
         every = list(evaluations)
         if not every:
             raise InputError("nothing to pool: give at least one evaluation")
-        tallies: dict[str, float] = {}
-        samples: dict[str, list[NDArray[np.float64]]] = {}
         for evaluation in every:
             if evaluation.evaluator != self:
                 raise InputError(
                     f"evaluations by {evaluation.evaluator} and by {self} cannot be pooled: use one evaluator with one "
                     "set of parameters"
                 )
-            for key, value in evaluation.tallies.items():
-                tallies[key] = tallies.get(key, 0) + value
-            for key, array in evaluation.samples.items():
-                samples.setdefault(key, []).append(array)
-        joined = {key: np.concatenate(arrays) for key, arrays in samples.items()}
-        return self.summarise(tallies, joined, [f"pooled over {len(every)} evaluations"])
+        tallies = functools.reduce(operator.add, [evaluation.tallies for evaluation in every])
+        return self.summarise(tallies, [f"pooled over {len(every)} evaluations"])
+
+    @classmethod
+    def index(cls, name: str) -> Index:
+        """Return an index by its key or its printed symbol.
+
+        Raises
+        ------
+        UnknownNameError
+            No index is called so; the nearest one is named.
+        """
+        by_key = {index.key: index for index in cls.indices}
+        by_symbol = {index.symbol: index for index in reversed(cls.indices) if index.symbol}
+        found = by_key.get(name) or by_symbol.get(name)
+        if found is None:
+            raise UnknownNameError(
+                f"the evaluator {cls.name!r} has no index {name!r}{nearest_hint(name, [*by_key, *by_symbol])}; "
+                f"it has {', '.join(by_key)}"
+            )
+        return found
+
+    @classmethod
+    def ranking_index(cls) -> Index:
+        """Return the index that ranks when none is chosen."""
+        if cls.ranked_by:
+            return cls.index(cls.ranked_by)
+        return next((index for index in cls.indices if index.better != "neither"), cls.indices[0])
+
+    @classmethod
+    def gated_indices(cls) -> tuple[Index, ...]:
+        """Return the indices that are gated when none is chosen."""
+        if cls.gated_by:
+            return tuple(cls.index(key) for key in cls.gated_by)
+        return tuple(index for index in cls.indices if index.main and index.better != "neither")
+
+    @classmethod
+    def swept_indices(cls) -> tuple[Index, ...]:
+        """Return the indices that sensitivity plots show when none is chosen."""
+        return tuple(cls.index(key) for key in cls.swept_by) or (cls.ranking_index(),)
+
+    @classmethod
+    def kinds_of(cls, side: Side) -> tuple[VerdictKind, ...]:
+        """Return the verdict kinds of one side, in the order of legends."""
+        return tuple(kind for kind in cls.verdict_kinds if kind.side == side)
 
 
 def mean_values(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float | None, int]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 from shapely import Geometry, MultiPolygon, Polygon, is_valid, is_valid_reason
 
@@ -12,16 +12,44 @@ from ..scenes.geodata.crs import require_metric
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.geodata.raster import Grid
 from .base import Evaluation, Evaluator
-from .registry import make_evaluator
+from .registry import DEFAULT, make_evaluator
+
+if TYPE_CHECKING:
+    from .threshold_free.evaluator import ThresholdFreeEvaluation
 
 __all__ = ["evaluate", "pool"]
+
+
+@overload
+def evaluate(
+    detected: Footprints,
+    reference: Footprints,
+    *,
+    area: Geometry | None = None,
+    grid: Grid | None = None,
+    matching: str = ...,
+    gsd: float | None = ...,
+    minimum_area: float = ...,
+) -> ThresholdFreeEvaluation: ...
+
+
+@overload
+def evaluate(
+    detected: Footprints,
+    reference: Footprints,
+    *,
+    evaluator: str | Evaluator = DEFAULT,
+    area: Geometry | None = None,
+    grid: Grid | None = None,
+    **parameters: Any,
+) -> Evaluation: ...
 
 
 def evaluate(
     detected: Footprints,
     reference: Footprints,
     *,
-    evaluator: str | Evaluator = "threshold-free",
+    evaluator: str | Evaluator = DEFAULT,
     area: Geometry | None = None,
     grid: Grid | None = None,
     **parameters: Any,
@@ -39,8 +67,8 @@ def evaluate(
     grid : Grid, optional
         Grid of the orthoimage, for indices counted in pixels.
     **parameters
-        Parameters of the evaluator, for instance ``matching="overlap"``. (Its parameter ``area`` of the threshold-free
-        evaluator, how areas are measured, is set through the name: ``"threshold-free[area=exact]"``.)
+        Parameters of the evaluator, for instance ``matching="overlap"``. (The parameter ``area`` of the default
+        evaluator, how areas are measured, is set through its name: ``evaluator=f"{DEFAULT}[area=exact]"``.)
 
     Raises
     ------
@@ -68,22 +96,22 @@ def evaluate(
             )
         if len(footprints):
             require_metric(footprints.crs, footprints.source, heights=False)
-    judge = make_evaluator(evaluator, parameters)
+    chosen = make_evaluator(evaluator, parameters)
     if area is not None:
-        _require_polygon(area, judge)
-    return judge.evaluate(detected, reference, area=area, grid=grid)
+        _require_polygon(area, chosen)
+    return chosen.evaluate(detected, reference, area=area, grid=grid)
 
 
-def _require_polygon(area: Any, judge: Evaluator) -> None:
+def _require_polygon(area: Any, evaluator: Evaluator) -> None:
     what = "area is the polygon inside which the reference is complete"
     if isinstance(area, str):
         raise InputError(
-            f"{what}, not {area!r}: how areas are measured is chosen by evaluator='{judge.name}[area={area}]'"
+            f"{what}, not {area!r}: how areas are measured is chosen by evaluator='{evaluator.name}[area={area}]'"
         )
     if not isinstance(area, Polygon | MultiPolygon):
         raise InputError(f"{what}, not {type(area).__name__}: give a shapely Polygon or MultiPolygon")
     if not is_valid(area):
-        raise InputError(f"{what}, but it is invalid ({is_valid_reason(area)}): mend it with shapely.make_valid")
+        raise InputError(f"{what}, but it is invalid ({is_valid_reason(area)}): repair it with shapely.make_valid")
 
 
 def pool(evaluations: Iterable[Evaluation]) -> Evaluation:

@@ -8,14 +8,17 @@ from typing import Any
 from ..core.registry import Registry, parse_selection
 from .base import Evaluator
 
-__all__ = ["EVALUATORS", "make_evaluator"]
+__all__ = ["DEFAULT", "EVALUATORS", "make_evaluator"]
+
+#: Name of the evaluator that is used when none is chosen.
+DEFAULT = "threshold-free"
 
 EVALUATORS = Registry(
     "evaluator",
     "roofbench.evaluators",
     Evaluator,
     {
-        "threshold-free": "evaluators.threshold_free.evaluator:ThresholdFree",
+        DEFAULT: "evaluators.threshold_free.evaluator:ThresholdFree",
     },
 )
 

@@ -58,5 +58,5 @@ def described(evaluation: Evaluation) -> str:
 
 def _counts_line(evaluation: Evaluation) -> str:
     """Return the objects behind the figures."""
-    counts = {key: int(value) for key, value in evaluation.tallies.items() if key.startswith("counts.")}
+    counts = {key: value for key, value in evaluation.tallies.to_dict().items() if key.startswith("counts.")}
     return " · ".join(f"{value:,} {key.removeprefix('counts.').replace('_', ' ')}" for key, value in counts.items())

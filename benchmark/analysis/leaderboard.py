@@ -13,6 +13,7 @@ import numpy as np
 from ...core.errors import UnknownNameError
 from ...core.registry import nearest_hint
 from ...evaluators.base import Evaluation, Evaluator, Index
+from ...evaluators.tally import Tallies
 from ..plan import KeyedEvaluator
 from ..store.records import RunRow
 from ..store.writer import Store
@@ -129,19 +130,19 @@ class _Tally:
     @cached_property
     def _pooled_intervals(self) -> dict[str, tuple[float, float]]:
         """Return the interval of every pooled index: scenes are resampled and their tallies added anew."""
-        names = sorted({name for evaluation in self._evaluations for name in evaluation.tallies})
-        scenes = {scene: place for place, scene in enumerate(dict.fromkeys(row.scene for row in self._evaluated))}
+        scenes: dict[str, Tallies] = {}
+        for row, evaluation in zip(self._evaluated, self._evaluations, strict=True):
+            known = scenes.get(row.scene)
+            scenes[row.scene] = evaluation.tallies if known is None else known + evaluation.tallies
         if len(scenes) < 2:
             return {}
-        tallies = np.zeros((len(scenes), len(names)))
-        for row, evaluation in zip(self._evaluated, self._evaluations, strict=True):
-            tallies[scenes[row.scene]] += [evaluation.tallies.get(name, 0.0) for name in names]
+        weights = resampling_weights(len(scenes), _RESAMPLES)
         resampled: dict[str, list[float]] = {}
-        for sums in resampling_weights(len(scenes), _RESAMPLES) @ tallies:
-            values = self._evaluator.summarise(dict(zip(names, sums.tolist(), strict=True)), {}).values
-            for key, value in values.items():
+        for tallies in self._evaluator.tallies_type.resampled(list(scenes.values()), weights):
+            for index in self._evaluator.indices:
+                value = index.formula(tallies)
                 if value is not None:
-                    resampled.setdefault(key, []).append(value)
+                    resampled.setdefault(index.key, []).append(value)
         tail = expanded_level(len(scenes))
         intervals = {}
         for key, found in resampled.items():

@@ -107,44 +107,33 @@ class Score:
     evaluator : PluginRecipe
     code : str
         Digest of the evaluator's source closure.
-    tallies, samples, values, notes
-        As of `Evaluation`; samples as lists.
-    verdicts : mapping of str to list of dict
-        Rows of both sides without geometry; empty when the evaluator gives none.
+    tallies : mapping
+        By dotted name, as JSON holds them.
+    values, notes
+        As of `Evaluation`.
+    verdicts : tuple of bytes
+        The verdict tables of the detections and of the references; empty when the evaluator gives none.
     """
 
     evaluator: PluginRecipe
     code: str
-    tallies: Mapping[str, float]
-    samples: Mapping[str, list[float]]
+    tallies: Mapping[str, Any]
     values: Mapping[str, float | None]
     notes: tuple[str, ...]
-    verdicts: Mapping[str, list[dict[str, Any]]] = field(default_factory=dict)
+    verdicts: tuple[bytes, ...] = ()
 
     @classmethod
     def of(cls, evaluation: Evaluation, recipe: PluginRecipe, code: str) -> Self:
         """Take what is kept from an evaluation."""
-        verdicts: dict[str, list[dict[str, Any]]] = {}
         given = evaluation.verdicts
-        if given is not None:
-            for side, table in (("detection", given.detection_columns), ("reference", given.reference_columns)):
-                names = [name for name in table if name != "geometry"]
-                columns = [[_plain(value) for value in _values(table[name])] for name in names]
-                verdicts[side] = [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
         return cls(
             evaluator=recipe,
             code=code,
-            tallies={name: _plain(value) for name, value in evaluation.tallies.items()},
-            samples={name: np.asarray(array, dtype=np.float64).tolist() for name, array in evaluation.samples.items()},
-            values={name: _plain(value) for name, value in evaluation.values.items()},
+            tallies=evaluation.tallies.to_dict(),
+            values=dict(evaluation.values),
             notes=tuple(evaluation.notes),
-            verdicts=verdicts,
+            verdicts=() if given is None else tuple(table.to_bytes() for _, table, _ in given.sides),
         )
-
-
-def _values(column: Any) -> list[Any]:
-    """Return the values of a column; those of an array as Python numbers, which are faster to go through."""
-    return column.tolist() if hasattr(column, "tolist") else list(column)
 
 
 def _plain(value: Any) -> Any:
@@ -217,8 +206,11 @@ class Outcome:
         """Return a JSON header followed by the geometries."""
         header = _fields(self)
         header["cost"] = _fields(self.cost)
-        header["scores"] = [{**_fields(score), "evaluator": score.evaluator.to_dict()} for score in self.scores]
-        blobs = [*self.detections]
+        header["scores"] = [
+            {**_fields(score), "evaluator": score.evaluator.to_dict(), "verdicts": len(score.verdicts)}
+            for score in self.scores
+        ]
+        blobs = [*self.detections, *(table for score in self.scores for table in score.verdicts)]
         header["detections"] = len(self.detections)
         if self.scene is not None:
             header["scene"] = _fields(self.scene)
@@ -242,10 +234,13 @@ class Outcome:
         number = header["detections"]
         header["detections"] = tuple(blobs[:number])
         header["cost"] = Cost(**header["cost"])
-        header["scores"] = tuple(
-            Score(**{**score, "evaluator": PluginRecipe(**score["evaluator"]), "notes": tuple(score["notes"])})
-            for score in header["scores"]
-        )
+        scores = []
+        for score in header["scores"]:
+            tables = tuple(blobs[number : number + score["verdicts"]])
+            number += len(tables)
+            recipe, notes = PluginRecipe(**score["evaluator"]), tuple(score["notes"])
+            scores.append(Score(**{**score, "evaluator": recipe, "notes": notes, "verdicts": tables}))
+        header["scores"] = tuple(scores)
         if header["scene"] is not None:
             record = header["scene"]
             if record["reference"] is not None:

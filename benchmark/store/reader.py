@@ -8,11 +8,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import shapely
 
 from ...core.errors import InputError, UnknownNameError
 from ...evaluators.base import Evaluation, Evaluator
+from ...evaluators.verdict_table import SIDES, VerdictTable
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..execution.tasks import Status, footprints_of
@@ -173,14 +173,6 @@ class StoreReader:
         """Return the commands that asked for runs, in order."""
         return [str(row[0]) for row in self._db.execute("SELECT command FROM plans ORDER BY id")]
 
-    def verdict_words(self, run_id: int, key: str) -> tuple[list[str], list[str]]:
-        """Return the verdict of each reference and of each detection, in the order of the objects."""
-        query = """SELECT side, verdict FROM verdicts JOIN evaluations ON evaluation_id = evaluations.id
-            WHERE run_id = ? AND key = ? ORDER BY side, position"""
-        rows = self._db.execute(query, (run_id, key)).fetchall()
-        sides = {side: [row[1] for row in rows if row[0] == side] for side in ("reference", "detection")}
-        return sides["reference"], sides["detection"]
-
     def scene_picture(self, scene_id: int) -> bytes | None:
         """Return the picture of a scene (WebP over its extent); None when it has none or was never opened."""
         row = self._db.execute("SELECT content FROM scene_pictures WHERE scene_id = ?", (scene_id,)).fetchone()
@@ -205,21 +197,18 @@ class StoreReader:
         )
 
     def evaluation(self, run_id: int, evaluator: Evaluator, key: str) -> Evaluation | None:
-        """Return the stored evaluation of a run, rebuilt from tallies and samples; None when it was not evaluated."""
+        """Return the stored evaluation of a run, rebuilt from its tallies; None when it was not evaluated."""
         return self.evaluations([run_id], evaluator, key).get(run_id)
 
     def evaluations(self, run_ids: Iterable[int], evaluator: Evaluator, key: str) -> dict[int, Evaluation]:
         """Return the stored evaluations of several runs by one evaluator, by run id."""
         wanted = set(run_ids)
         found = {}
-        query = "SELECT run_id, tallies, samples, notes FROM evaluations WHERE key = ?"
+        query = "SELECT run_id, tallies, notes FROM evaluations WHERE key = ?"
         for row in self._db.execute(query, (key,)):
             if row["run_id"] in wanted:
-                samples = {
-                    name: np.asarray(values, dtype=np.float64) for name, values in json.loads(row["samples"]).items()
-                }
-                notes = json.loads(row["notes"])
-                found[int(row["run_id"])] = evaluator.summarise(json.loads(row["tallies"]), samples, notes)
+                tallies = evaluator.tallies_type.from_dict(json.loads(row["tallies"]))
+                found[int(row["run_id"])] = evaluator.summarise(tallies, json.loads(row["notes"]))
         return found
 
     def index_values(self, run_ids: Iterable[int], key: str) -> dict[int, dict[str, float | None]]:
@@ -233,14 +222,27 @@ class StoreReader:
                 values.setdefault(run_id, {})[name] = value
         return values
 
+    def verdict_tables(self, run_id: int, key: str) -> tuple[VerdictTable, VerdictTable] | None:
+        """Return the verdicts of the detections and of the references; None where none are stored."""
+        query = """SELECT side, content FROM verdict_tables JOIN evaluations ON evaluation_id = evaluations.id
+            WHERE run_id = ? AND key = ?"""
+        found = {row["side"]: VerdictTable.from_bytes(row["content"]) for row in self._db.execute(query, (run_id, key))}
+        return (found["detection"], found["reference"]) if len(found) == len(SIDES) else None
+
+    def verdict_words(self, run_id: int, key: str) -> tuple[list[str], list[str]]:
+        """Return the verdict of each reference and of each detection, in the order of the objects."""
+        detection, reference = self.verdict_tables(run_id, key) or (None, None)
+        if detection is None or reference is None:
+            return [], []
+        return reference.verdicts.tolist(), detection.verdicts.tolist()
+
     def verdicts(self, run_id: int, key: str) -> dict[str, list[dict[str, Any]]]:
         """Return the verdict rows of both sides in the order of the objects, without geometry."""
-        sides: dict[str, list[dict[str, Any]]] = {"detection": [], "reference": []}
-        query = """SELECT side, verdicts.id, verdict, reason, details FROM verdicts
-            JOIN evaluations ON evaluation_id = evaluations.id WHERE run_id = ? AND key = ? ORDER BY side, position"""
-        for row in self._db.execute(query, (run_id, key)):
-            plain = {"id": row["id"], "verdict": row["verdict"], "reason": row["reason"], **json.loads(row["details"])}
-            sides[row["side"]].append(plain)
+        tables = self.verdict_tables(run_id, key)
+        sides: dict[str, list[dict[str, Any]]] = {side: [] for side in SIDES}
+        for side, table in zip(SIDES, tables or (), strict=False):
+            columns = {name: column.tolist() for name, column in table.columns().items()}
+            sides[side] = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         return sides
 
     def evaluators(self) -> list[tuple[str, PluginRecipe]]:

@@ -13,7 +13,7 @@ from ...core.errors import InputError
 
 __all__ = ["VERSION", "prepare"]
 
-VERSION = 2
+VERSION = 3
 
 #: One script per version: MIGRATIONS[n] leads from version n to n + 1.
 MIGRATIONS: tuple[str, ...] = (
@@ -123,6 +123,19 @@ MIGRATIONS: tuple[str, ...] = (
     CREATE TABLE scene_pictures (
         scene_id INTEGER PRIMARY KEY REFERENCES scenes ON DELETE CASCADE,
         content BLOB NOT NULL             -- WebP over the extent, for reports
+    );
+    """,
+    # Samples of a tally become its histogram when they are read. Verdicts follow from the detections, which are kept:
+    # 'roofbench score' writes them again.
+    """
+    UPDATE evaluations SET tallies = json_patch(tallies, samples);
+    ALTER TABLE evaluations DROP COLUMN samples;
+    DROP TABLE verdicts;
+    CREATE TABLE verdict_tables (
+        evaluation_id INTEGER NOT NULL REFERENCES evaluations ON DELETE CASCADE,
+        side TEXT NOT NULL CHECK (side IN ('detection', 'reference')),
+        content BLOB NOT NULL,            -- VerdictTable.to_bytes
+        PRIMARY KEY (evaluation_id, side)
     );
     """,
 )

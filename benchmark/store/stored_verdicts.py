@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ...evaluators.base import Verdicts
-from ...scenes.geodata.footprints import Footprints
 from .writer import Store
 
 __all__ = ["stored_verdicts"]
@@ -13,15 +10,16 @@ __all__ = ["stored_verdicts"]
 
 def stored_verdicts(store: Store, run_id: int, key: str) -> Verdicts | None:
     """Return the verdicts of a run by the evaluator of that key, geometry included; None when it gave none."""
-    rows = store.verdicts(run_id, key)
+    tables = store.verdict_tables(run_id, key)
     reference = store.scene(store.run(run_id).scene_id).reference
-    if reference is None or not (rows["detection"] or rows["reference"]):
+    if tables is None or reference is None:
         return None
-    sides: dict[str, Footprints] = {"detection": store.detections(run_id), "reference": reference}
-    columns: dict[str, dict[str, Any]] = {}
-    for side, footprints in sides.items():
-        names = dict.fromkeys(name for row in rows[side] for name in row)
-        columns[side] = {name: [row.get(name) for row in rows[side]] for name in names}
-        columns[side]["geometry"] = footprints.polygons
-        columns[side] = {**footprints.attributes, **columns[side]}
-    return Verdicts(columns["detection"], columns["reference"])
+    evaluator = dict(store.evaluators_of(run_id))[key].evaluator()
+    return Verdicts(
+        kinds=evaluator.verdict_kinds,
+        measures=evaluator.measures,
+        detection_table=tables[0],
+        reference_table=tables[1],
+        detected=store.detections(run_id),
+        reference=reference,
+    )

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from ...core.errors import OutputError
+from ...evaluators.verdict_table import SIDES
 from ..execution.tasks import Outcome, SceneRecord, Score
 from ..identity.keys import SourceClosure, canonical
 from ..identity.recipes import SceneRecipe
@@ -123,8 +124,8 @@ class Store(StoreReader):
     def _score(self, run_id: int, score: Score) -> None:
         key = evaluation_key(score.evaluator, score.code)
         cursor = self._db.execute(
-            """INSERT OR IGNORE INTO evaluations (run_id, key, evaluator, parameters, code, tallies, samples, notes)
-               VALUES (?,?,?,?,?,?,?,?)""",
+            """INSERT OR IGNORE INTO evaluations (run_id, key, evaluator, parameters, code, tallies, notes)
+               VALUES (?,?,?,?,?,?,?)""",
             (
                 run_id,
                 key,
@@ -132,7 +133,6 @@ class Store(StoreReader):
                 canonical(dict(score.evaluator.parameters)),
                 score.code,
                 canonical(dict(score.tallies)),
-                canonical(dict(score.samples)),
                 canonical(list(score.notes)),
             ),
         )
@@ -143,21 +143,10 @@ class Store(StoreReader):
             "INSERT INTO index_values VALUES (?, ?, ?)",
             ((evaluation_id, name, value) for name, value in score.values.items()),
         )
-        named = ("id", "verdict", "reason")
-        for side, rows in score.verdicts.items():
-            self._db.executemany(
-                "INSERT INTO verdicts VALUES (?,?,?,?,?,?,?)",
-                (
-                    (
-                        evaluation_id,
-                        side,
-                        position,
-                        *(row.get(name) for name in named),
-                        canonical({name: value for name, value in row.items() if name not in named}),
-                    )
-                    for position, row in enumerate(rows)
-                ),
-            )
+        self._db.executemany(
+            "INSERT INTO verdict_tables VALUES (?, ?, ?)",
+            ((evaluation_id, side, table) for side, table in zip(SIDES, score.verdicts, strict=False)),
+        )
 
     def _scene(self, recipe: SceneRecipe, key: str, record: SceneRecord | None) -> int:
         db = self._db

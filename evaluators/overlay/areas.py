@@ -25,19 +25,19 @@ import shapely
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
+from ..tally import Tallies
 from .convex import convex_intersection_areas
 from .overlaps import Overlaps, common_ground, quadrilateral_rows
 
 __all__ = ["AreaTally", "exact_areas"]
 
-
 #: Pairs (first, second) of members that share area, and how much, m2.
 _Conflicts: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
 
-@dataclass(frozen=True)
-class AreaTally:
-    """Areas of one evaluation, m2.
+@dataclass(frozen=True, kw_only=True)
+class AreaTally(Tallies):
+    """Areas of an evaluation, m2.
 
     Attributes
     ----------
@@ -47,12 +47,12 @@ class AreaTally:
         Sums over the TP pairs alone: area of d, of r, and of (d and r).
     """
 
-    true_positive: float
-    false_positive: float
-    false_negative: float
-    pair_detected: float
-    pair_reference: float
-    pair_shared: float
+    true_positive: float = 0.0
+    false_positive: float = 0.0
+    false_negative: float = 0.0
+    pair_detected: float = 0.0
+    pair_reference: float = 0.0
+    pair_shared: float = 0.0
 
 
 def exact_areas(

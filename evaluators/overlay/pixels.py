@@ -10,6 +10,7 @@ span ends sorted by (row, column). Memory grows with the number of spans in a ba
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 
 import numpy as np
 import shapely
@@ -60,7 +61,8 @@ def pixel_areas(
     counted = np.zeros(6)
     for polygon, row, column, sign in _crossings(polygons, grid):
         counted += _count_band(objects[polygon], channel[polygon], row, column, sign, n_pairs)
-    return AreaTally(*(float(value) for value in counted * grid.gsd**2))
+    names = (each.name for each in fields(AreaTally))
+    return AreaTally(**dict(zip(names, (counted * grid.gsd**2).tolist(), strict=True)))
 
 
 def _crossings(polygons: NDArray[np.object_], grid: Grid) -> Iterator[tuple[NDArray[np.int64], ...]]:

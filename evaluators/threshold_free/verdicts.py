@@ -1,57 +1,42 @@
-"""Verdicts: for every object what it counts as, and why, in words.
+"""Verdicts of the threshold-free evaluation: what each object counts as, and why, in words.
 
-Everything follows from the overlap graph and the correspondence. Codes are kept as arrays; the words are written only
-when somebody asks, since a city has a million of them.
+Everything follows from the object graph. The words are written only when they are asked for, since a city has a million
+of them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
-from ..base import Verdicts
-from ..overlay.overlaps import Overlaps
-from .correspondence import DECIMALS, Correspondence
+from ..verdict_table import Measure, VerdictKind, Verdicts, VerdictTable
+from .correspondence import DECIMALS
+from .object_graph import ObjectGraph
 
-__all__ = ["ObjectGraph", "verdict_tables"]
+__all__ = ["MEASURES", "VERDICT_KINDS", "find_verdicts"]
 
+VERDICT_KINDS = (
+    VerdictKind(key="TP", label="detected building", side="detection", role="correct", counts_as="correct"),
+    VerdictKind(key="MD", label="multiple detection", side="detection", role="partial", counts_as="duplicate"),
+    VerdictKind(key="FP", label="false alarm", side="detection", role="excess", counts_as="wrong"),
+    VerdictKind(key="left out", label="left out", side="detection", role="left out", counts_as="neutral"),
+    VerdictKind(key="TP", label="reference of a TP", side="reference", role="outline", counts_as="correct"),
+    VerdictKind(key="FN", label="missed reference", side="reference", role="missing", counts_as="wrong"),
+    VerdictKind(key="left out", label="left out", side="reference", role="left out", counts_as="neutral"),
+)
 
-@dataclass(frozen=True, eq=False)
-class ObjectGraph:
-    """All that an evaluation knows of the single objects.
+MEASURES = (
+    Measure(key="distance", title="centre distance", unit="m"),
+    Measure(key="overlap_area", title="shared area", unit="m2"),
+    Measure(key="iou", title="IoU", unit="fraction"),
+    Measure(key="rmse", title="corner distance", unit="m"),
+)
 
-    Attributes
-    ----------
-    detected, reference : Footprints
-    overlaps : Overlaps
-        Overlapping (detection, reference) pairs.
-    distances : ndarray, shape (len(overlaps),)
-        Centre distance of each overlapping pair, m.
-    correspondence : Correspondence
-    counted_detections, counted_references : ndarray of bool
-        False where an object is left out (outside the evaluation area, or smaller than the minimum size).
-    left_out_reason : tuple of two arrays of str
-        Why, for detections and references; empty where counted.
-    pair_outline : ndarray, shape (number of TP pairs,)
-        Outline distance of each TP pair, by detection, m.
-    duplicates : ndarray of bool
-        The multiple detections that overlap the detection which stands for their reference; the others are pieces.
-    """
-
-    detected: Footprints
-    reference: Footprints
-    overlaps: Overlaps
-    distances: NDArray[np.float64]
-    correspondence: Correspondence
-    counted_detections: NDArray[np.bool_]
-    counted_references: NDArray[np.bool_]
-    left_out_reason: tuple[NDArray[np.object_], NDArray[np.object_]]
-    pair_outline: NDArray[np.float64]
-    duplicates: NDArray[np.bool_]
+_DETECTION_KINDS = tuple(kind.key for kind in VERDICT_KINDS if kind.side == "detection")
+_REFERENCE_KINDS = tuple(kind.key for kind in VERDICT_KINDS if kind.side == "reference")
 
 
 class _Neighbours:
@@ -78,73 +63,90 @@ class _Neighbours:
         return pair
 
 
-def verdict_tables(graph: ObjectGraph) -> Verdicts:
+def find_verdicts(graph: ObjectGraph, pair_outline: NDArray[np.float64]) -> Verdicts:
     """Write one row per detection and one per reference.
 
-    Columns: ``id`` (row in the source), ``verdict`` (TP, MD, FP / TP, FN, or ``left out``), ``partner`` (id on the
-    other side: the matched one, else the nearest overlapped; <NA> without), ``distance`` (m between centres),
-    ``overlap_area`` (m2), ``iou``, ``rmse`` (m, TP only), ``reason``, ``geometry``.
+    The partner of an object without a match is the nearest one that it overlaps. ``rmse`` is given for TP only.
+
+    Parameters
+    ----------
+    graph : ObjectGraph
+    pair_outline : ndarray, shape (number of TP pairs,)
+        Outline distance of each TP pair, by detection, m.
     """
     pairs, match = graph.overlaps, graph.correspondence
     of_detection = _Neighbours(pairs.first, pairs.second, graph.distances, len(graph.detected))
     of_reference = _Neighbours(pairs.second, pairs.first, graph.distances, len(graph.reference))
-    pair_of_match = _matched_positions(pairs, match)
-    claims = _Claims.of(graph)
+    words = _Words(graph, of_detection, of_reference, _Claims.of(graph))
     detections, references = match.pairs
-    rmse = np.full(len(graph.detected), np.nan)
-    rmse[detections] = graph.pair_outline
-    rmse_reference = np.full(len(graph.reference), np.nan)
-    rmse_reference[references] = graph.pair_outline
+    pair_of_match = np.full(len(graph.detected), -1, dtype=np.int64)
+    pair_of_match[detections] = graph.matched_overlaps
 
     matched = match.of_detection >= 0
+    kind = np.where(matched, 0, np.where(of_detection.count > 0, 1, 2)).astype(np.uint8)
+    kind[~graph.detections.mask] = 3
     position = np.where(matched, pair_of_match, of_detection.nearest_pair())
-    verdict = np.where(matched, "TP", np.where(of_detection.count > 0, "MD", "FP")).astype(object)
-    verdict[~graph.counted_detections] = "left out"
-    table_d = _table(graph.detected, verdict, position, pairs.second, graph.reference, graph, rmse)
-    table_d["reason"] = _detection_reasons(graph, verdict, of_detection, claims, table_d["distance"])
+    partner, measures = _measured(graph, position, graph.detected, graph.reference.ids, pairs.second)
+    measures["rmse"] = _spread(pair_outline, detections, len(graph.detected))
+    detection_table = VerdictTable(
+        ids=graph.detected.ids,
+        kinds=_DETECTION_KINDS,
+        kind=kind,
+        partner=partner,
+        measures=measures,
+        reasons=tuple(words.of_detections(kind, measures["distance"])),
+    )
 
     matched = match.of_reference >= 0
+    kind = np.where(matched, 0, 1).astype(np.uint8)
+    kind[~graph.references.mask] = 2
     own_pair = np.full(len(graph.reference), -1, dtype=np.int64)
-    own_pair[references] = pair_of_match[detections]
+    own_pair[references] = graph.matched_overlaps
     position = np.where(matched, own_pair, of_reference.nearest_pair())
-    verdict = np.where(matched, "TP", "FN").astype(object)
-    verdict[~graph.counted_references] = "left out"
-    table_r = _table(graph.reference, verdict, position, pairs.first, graph.detected, graph, rmse_reference)
-    table_r["reason"] = _reference_reasons(graph, table_r, of_detection, of_reference, claims)
-    for table, footprints in ((table_d, graph.detected), (table_r, graph.reference)):
-        table["geometry"] = footprints.polygons
-    return Verdicts(table_d, table_r)
+    partner, measures = _measured(graph, position, graph.reference, graph.detected.ids, pairs.first)
+    measures["rmse"] = _spread(pair_outline, references, len(graph.reference))
+    reference_table = VerdictTable(
+        ids=graph.reference.ids,
+        kinds=_REFERENCE_KINDS,
+        kind=kind,
+        partner=partner,
+        measures=measures,
+        reasons=tuple(words.of_references(kind, measures)),
+    )
+    return Verdicts(
+        kinds=VERDICT_KINDS,
+        measures=MEASURES,
+        detection_table=detection_table,
+        reference_table=reference_table,
+        detected=graph.detected,
+        reference=graph.reference,
+    )
 
 
-def _matched_positions(pairs: Overlaps, match: Correspondence) -> NDArray[np.int64]:
-    """Return for each detection the position of its matched pair in the overlaps, or -1."""
-    positions = np.full(len(match.of_detection), -1, dtype=np.int64)
-    is_match = match.of_detection[pairs.first] == pairs.second
-    positions[pairs.first[is_match]] = np.flatnonzero(is_match)
-    return positions
+def _spread(values: NDArray[np.float64], rows: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+    """Return `values` at `rows` of a column of `count` rows, NaN elsewhere."""
+    column = np.full(count, np.nan)
+    column[rows] = values
+    return column
 
 
-def _table(
-    footprints: Footprints,
-    verdict: NDArray[np.object_],
-    position: NDArray[np.int64],
-    other_rows: NDArray[np.int64],
-    others: Footprints,
+def _measured(
     graph: ObjectGraph,
-    rmse: NDArray[np.float64],
-) -> dict[str, Any]:
-    has = position >= 0
+    position: NDArray[np.int64],
+    own: Footprints,
+    other_ids: NDArray[np.int64],
+    other_rows: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], dict[str, NDArray[np.float64]]]:
+    """Return the id of each object's partner, and the measures of the overlap at `position` (-1: none)."""
+    has = np.flatnonzero(position >= 0)
     pair = position[has]
-    partner = np.zeros(len(footprints), dtype=np.int64)
-    partner[has] = others.ids[other_rows[pair]]
-    numbers = {name: np.full(len(footprints), np.nan) for name in ("distance", "overlap_area", "iou")}
-    numbers["distance"][has] = graph.distances[pair]
-    shared = graph.overlaps.area[pair]
-    numbers["overlap_area"][has] = shared
-    united = footprints.areas[has] + others.areas[other_rows[pair]] - shared
-    numbers["iou"][has] = np.minimum(shared / united, 1.0)
-    partners = np.ma.MaskedArray(partner, mask=~has)
-    return {"id": footprints.ids, "verdict": verdict, "partner": partners, **numbers, "rmse": rmse}
+    partner = np.full(len(own), -1, dtype=np.int64)
+    partner[has] = other_ids[other_rows[pair]]
+    return partner, {
+        "distance": _spread(graph.distances[pair], has, len(own)),
+        "overlap_area": _spread(graph.overlaps.area[pair], has, len(own)),
+        "iou": _spread(graph.iou(pair), has, len(own)),
+    }
 
 
 def _names(footprints: Footprints, rows: list[int]) -> str:
@@ -167,9 +169,9 @@ class _Claims:
     Attributes
     ----------
     pieces : list of int
-        Detections that stand for a reference or are pieces of it: more than one when it is split.
+        Detections that are matched with a reference or are pieces of it: more than one where it is split.
     times : list of int
-        Detections that stand for it or duplicate that one: more than one when it is detected again.
+        Detections that are matched with it or duplicate that one: more than one where it is detected again.
     home : list of int
         For each detection the reference that it is matched with or booked on, or -1.
     """
@@ -181,7 +183,7 @@ class _Claims:
     @classmethod
     def of(cls, graph: ObjectGraph) -> _Claims:
         match = graph.correspondence
-        multiple = graph.counted_detections & (match.of_detection < 0) & (match.booked_on >= 0)
+        multiple = graph.detections.mask & (match.of_detection < 0) & (match.booked_on >= 0)
         found = (match.of_reference >= 0).astype(np.int64)
 
         def booked(kind: NDArray[np.bool_]) -> list[int]:
@@ -195,90 +197,95 @@ class _Claims:
             home.tolist(),
         )
 
-    def told(self, reference: int, subject: str = "") -> str:
+    def in_words(self, reference: int, subject: str = "") -> str:
         text = f"; {subject}split into {self.pieces[reference]} detections" if self.pieces[reference] > 1 else ""
         return text + (f"; {subject}detected {self.times[reference]} times" if self.times[reference] > 1 else "")
 
 
-def _detection_reasons(
-    graph: ObjectGraph,
-    verdict: NDArray[np.object_],
-    of_detection: _Neighbours,
-    claims: _Claims,
-    distance: NDArray[np.float64],
-) -> list[str]:
-    reference_ids, detection_ids = graph.reference.ids.tolist(), graph.detected.ids.tolist()
-    touched, duplicates = of_detection.count.tolist(), graph.duplicates.tolist()
-    holder = graph.correspondence.of_reference.tolist()
-    reasons = []
-    for row, (what, moved) in enumerate(zip(verdict.tolist(), distance.tolist(), strict=True)):
-        if what == "FP":
-            reasons.append("false alarm: overlaps no reference")
-            continue
-        if what == "left out":
-            reasons.append(str(graph.left_out_reason[0][row]))
-            continue
-        mine = claims.home[row]
-        if what == "TP":
-            text = f"found reference {reference_ids[mine]}, shifted {moved:.1f} m" + claims.told(
-                mine, "the reference is "
-            )
-        elif duplicates[row]:
-            text = f"duplicate of detection {detection_ids[holder[mine]]} on reference {reference_ids[mine]}"
-        else:
-            text = (
-                f"piece of reference {reference_ids[mine]}, which is split into {claims.pieces[mine]} detections and "
-                f"represented by detection {detection_ids[holder[mine]]}"
-            )
-        if touched[row] > 1:
-            others = [other for other in of_detection.of(row) if other != mine]
-            text += f"; also covers part of reference {_names(graph.reference, others)}"
-        reasons.append(text)
-    return reasons
+class _Words:
+    """Reasons in words."""
 
+    def __init__(
+        self, graph: ObjectGraph, of_detection: _Neighbours, of_reference: _Neighbours, claims: _Claims
+    ) -> None:
+        self._graph = graph
+        self._of_detection, self._of_reference = of_detection, of_reference
+        self._claims = claims
+        self._detection_ids, self._reference_ids = graph.detected.ids.tolist(), graph.reference.ids.tolist()
 
-def _reference_reasons(
-    graph: ObjectGraph,
-    table: dict[str, Any],
-    of_detection: _Neighbours,
-    of_reference: _Neighbours,
-    claims: _Claims,
-) -> list[str]:
-    match = graph.correspondence
-    reference_ids, detection_ids = graph.reference.ids.tolist(), graph.detected.ids.tolist()
-    partner, holds = match.of_reference.tolist(), match.of_detection.tolist()
-    overlapping, touched = of_reference.count.tolist(), of_detection.count.tolist()
-    covered = (table["overlap_area"] / graph.reference.areas).tolist()
-    reasons = []
-    for row, (what, moved) in enumerate(zip(table["verdict"].tolist(), table["distance"].tolist(), strict=True)):
-        if what == "left out":
-            reasons.append(str(graph.left_out_reason[1][row]))
-        elif what == "TP":
-            mine = partner[row]
-            text = f"found by detection {detection_ids[mine]}, shifted {moved:.1f} m" + claims.told(row)
-            if touched[mine] > 1:
-                others = [other for other in of_detection.of(mine) if other != row]
-                text += f"; the detection also covers part of reference {_names(graph.reference, others)}"
-            if overlapping[row] > claims.pieces[row] + claims.times[row] - 1:
-                others = [other for other in of_reference.of(row) if claims.home[other] != row]
-                names = _names(graph.detected, others)
-                text += (
-                    f"; detection {names} of another reference covers part of it"
-                    if len(others) == 1
-                    else f"; detections {names} of other references cover parts of it"
-                )
-            reasons.append(text)
-        elif overlapping[row] == 0:
-            reasons.append("missed: no detection overlaps it")
-        else:
-            nearest = of_reference.of(row)[0]
-            name, share = detection_ids[nearest], _share(covered[row])
-            if holds[nearest] >= 0:
-                other = reference_ids[holds[nearest]]
-                text = f"merged with reference {other} into detection {name}, which covers {share} of it"
+    def of_detections(self, kind: NDArray[np.uint8], distance: NDArray[np.float64]) -> list[str]:
+        claims, graph = self._claims, self._graph
+        touched, duplicates = self._of_detection.count.tolist(), graph.duplicates.tolist()
+        holder, left_out = graph.correspondence.of_reference.tolist(), graph.detections.reasons
+        reasons = []
+        for row, (place, moved) in enumerate(zip(kind.tolist(), distance.tolist(), strict=True)):
+            verdict = _DETECTION_KINDS[place]
+            if verdict == "FP":
+                reasons.append("false alarm: overlaps no reference")
+                continue
+            if verdict == "left out":
+                reasons.append(str(left_out[row]))
+                continue
+            own = claims.home[row]
+            name = self._reference_ids[own]
+            if verdict == "TP":
+                text = f"found reference {name}, shifted {moved:.1f} m"
+                text += claims.in_words(own, "the reference is ")
+            elif duplicates[row]:
+                text = f"duplicate of detection {self._detection_ids[holder[own]]} on reference {name}"
             else:
-                # Only where a detection has a single choice (one-pass matching).
-                other = reference_ids[claims.home[nearest]]
-                text = f"missed: detection {name} overlaps it ({share}) but is booked on reference {other}"
+                text = (
+                    f"piece of reference {name}, which is split into {claims.pieces[own]} detections and "
+                    f"represented by detection {self._detection_ids[holder[own]]}"
+                )
+            if touched[row] > 1:
+                others = [other for other in self._of_detection.of(row) if other != own]
+                text += f"; also covers part of reference {_names(graph.reference, others)}"
             reasons.append(text)
-    return reasons
+        return reasons
+
+    def of_references(self, kind: NDArray[np.uint8], measures: dict[str, NDArray[np.float64]]) -> list[str]:
+        graph = self._graph
+        overlapping, left_out = self._of_reference.count.tolist(), graph.references.reasons
+        covered = (measures["overlap_area"] / graph.reference.areas).tolist()
+        distance = measures["distance"].tolist()
+        reasons = []
+        for row, place in enumerate(kind.tolist()):
+            verdict = _REFERENCE_KINDS[place]
+            if verdict == "left out":
+                reasons.append(str(left_out[row]))
+            elif verdict == "TP":
+                reasons.append(self._found(row, distance[row], overlapping[row]))
+            elif overlapping[row] == 0:
+                reasons.append("missed: no detection overlaps it")
+            else:
+                reasons.append(self._missed(row, covered[row]))
+        return reasons
+
+    def _found(self, row: int, moved: float, overlapping: int) -> str:
+        claims, graph = self._claims, self._graph
+        own = int(graph.correspondence.of_reference[row])
+        text = f"found by detection {self._detection_ids[own]}, shifted {moved:.1f} m" + claims.in_words(row)
+        if self._of_detection.count[own] > 1:
+            others = [other for other in self._of_detection.of(own) if other != row]
+            text += f"; the detection also covers part of reference {_names(graph.reference, others)}"
+        if overlapping > claims.pieces[row] + claims.times[row] - 1:
+            others = [other for other in self._of_reference.of(row) if claims.home[other] != row]
+            names = _names(graph.detected, others)
+            text += (
+                f"; detection {names} of another reference covers part of it"
+                if len(others) == 1
+                else f"; detections {names} of other references cover parts of it"
+            )
+        return text
+
+    def _missed(self, row: int, covered: float) -> str:
+        nearest = self._of_reference.of(row)[0]
+        name, share = self._detection_ids[nearest], _share(covered)
+        matched = int(self._graph.correspondence.of_detection[nearest])
+        if matched >= 0:
+            other = self._reference_ids[matched]
+            return f"merged with reference {other} into detection {name}, which covers {share} of it"
+        # Only where a detection has a single choice (one-pass matching).
+        other = self._reference_ids[self._claims.home[nearest]]
+        return f"missed: detection {name} overlaps it ({share}) but is booked on reference {other}"

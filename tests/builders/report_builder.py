@@ -19,10 +19,10 @@ from roofbench.benchmark.analysis.report_data import (
 )
 from roofbench.benchmark.analysis.results import Cell, Entry, Leaderboard
 from roofbench.benchmark.execution.scene_picture import scene_picture
-from roofbench.evaluators.threshold_free.indices import INDICES
+from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
 from roofbench.scenes.builtin import hamlet
 
-MAIN = tuple(index for index in INDICES if index.main)
+MAIN = tuple(index for index in ThresholdFree.indices if index.main)
 QUALITY = next(index for index in MAIN if index.key == "object.quality")
 
 

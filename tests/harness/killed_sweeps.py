@@ -42,7 +42,7 @@ def content(path):
                 row.seed,
                 [polygon.wkb for polygon in store.detections(row.id).polygons],
                 {name: None if value is None else struct.pack("<d", value) for name, value in values[row.id].items()},
-                store.verdicts(row.id, key),
+                [table.to_bytes() for table in store.verdict_tables(row.id, key)],
             )
             for row in rows
         ]

@@ -4,7 +4,7 @@ import pytest
 
 from roofbench.benchmark.analysis.results import CONCLUSIONS, GateResult, IndexConclusion
 from roofbench.core.errors import InputError
-from roofbench.evaluators.threshold_free.indices import INDICES
+from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
 from roofbench.reports.gate_figure import gate_figure
 from roofbench.reports.gate_json import gate_json, read_gate
 
@@ -27,7 +27,7 @@ def result():
             scenes=30,
         )
         for detector in ("original", "improved")
-        for index, conclusion, effect in zip(INDICES[:5], CONCLUSIONS, effects, strict=True)
+        for index, conclusion, effect in zip(ThresholdFree.indices[:5], CONCLUSIONS, effects, strict=True)
     )
     return GateResult(
         baseline="0.1 (a)", candidate="0.1 (b)", conclusions=conclusions, failures=("original on x",), level=0.05

@@ -1,24 +1,28 @@
+import shutil
 import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
 from roofbench.benchmark.execution.runner import score_stored
-from roofbench.benchmark.execution.tasks import Outcome
+from roofbench.benchmark.execution.tasks import Outcome, Score
 from roofbench.benchmark.execution.worker import execute
 from roofbench.benchmark.identity.keys import SourceClosure
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 from roofbench.benchmark.plan import KeyedEvaluator
-from roofbench.benchmark.store.records import RunIdentity
+from roofbench.benchmark.store.records import RunIdentity, evaluation_key
 from roofbench.benchmark.store.schema import MIGRATIONS, VERSION
 from roofbench.benchmark.store.writer import Store
 from roofbench.core.errors import InputError, RoofbenchError, UnknownNameError
 from roofbench.evaluators.registry import make_evaluator
 from roofbench.scenes.builtin import hamlet
+
+DATA = Path(__file__).parents[2] / "data"
 
 
 @pytest.fixture
@@ -67,8 +71,11 @@ def test_raw_detections_reference_and_indices_come_back_as_they_were(store, outc
     rebuilt = store.evaluation(run_id, judge.evaluator, judge.key)
     direct = judge.evaluator.evaluate(detected, scene.reference, grid=scene.grid)
     assert dict(rebuilt.values) == dict(direct.values)
-    verdicts = store.verdicts(run_id, judge.key)
-    assert [row["reason"] for row in verdicts["reference"]] == list(direct.verdicts.references["reason"])
+    stored = store.verdict_tables(run_id, judge.key)
+    for table, direct_table in zip(
+        stored, (direct.verdicts.detection_table, direct.verdicts.reference_table), strict=True
+    ):
+        assert table.to_bytes() == direct_table.to_bytes()
 
 
 def test_a_good_result_is_not_replaced_unless_asked(store, outcome):
@@ -145,24 +152,45 @@ def test_a_file_that_is_no_store_or_a_newer_one_is_refused(tmp_path):
         Store(tmp_path / "absent.sqlite", must_exist=True)
 
 
-def test_a_store_of_the_first_version_is_migrated_with_what_it_holds(tmp_path, outcome, judge):
+def test_a_store_of_version_0_1_shows_its_scores_and_scores_its_detections_again(tmp_path):
     path = tmp_path / "old.sqlite"
+    shutil.copy(DATA / "store-0.1.db", path)
     with Store(path) as store:
-        run_id = store.record(identity(), outcome, version="1")
+        assert store.count_runs() == 1
+        (row,) = store.runs()
+        ((key, recipe),) = store.evaluators()
+        evaluator = recipe.evaluator()
+        stored = store.index_values([row.id], key)[row.id]
+        rebuilt = store.evaluation(row.id, evaluator, key)
+        assert stored["object.quality"] == rebuilt.object.quality == 22 / 31
+        # The median follows from bins of 0.001 now; all others are the same to the last bit.
+        assert rebuilt.values["geometric.median_iou"] == pytest.approx(stored["geometric.median_iou"], abs=1e-3)
+        assert {**rebuilt.values, "geometric.median_iou": 0} == {**stored, "geometric.median_iou": 0}
+        scene = store.scene(row.scene_id)
+        detected = store.detections(row.id)
+        assert store.verdict_tables(row.id, key) is None
+        again = evaluator.evaluate(detected, scene.reference, grid=scene.grid)
+        assert again.values == rebuilt.values
+        store.add_score(row.id, Score.of(again, recipe, "new code"))
+        new_key = evaluation_key(recipe, "new code")
+        assert store.verdict_tables(row.id, new_key)[1].count("FN") == rebuilt.counts.false_negatives == 9
+    db = sqlite3.connect(path)
+    assert db.execute("PRAGMA user_version").fetchone() == (VERSION,)
+    db.close()
+
+
+def test_a_store_of_the_first_schema_is_migrated_with_its_content(tmp_path):
+    path = tmp_path / "old.sqlite"
+    shutil.copy(DATA / "store-0.1.db", path)
     old = sqlite3.connect(path)
     old.executescript("ALTER TABLE scenes DROP COLUMN point_count; DROP TABLE scene_pictures; PRAGMA user_version = 1")
     old.close()
     with Store(path) as store:
-        assert store.count_runs() == 1
-        scene = store.scene(store.run(run_id).scene_id)
+        (row,) = store.runs()
+        scene = store.scene(row.scene_id)
         assert scene.point_count is None
         assert store.scene_picture(scene.id) is None
-        assert len(store.detections(run_id)) == len(outcome.detections)
-        assert store.index_values([run_id], judge.key)[run_id]
-        store.record(identity(seed=1), outcome, version="2")
-    db = sqlite3.connect(path)
-    assert db.execute("PRAGMA user_version").fetchone() == (VERSION,)
-    db.close()
+        assert len(store.detections(row.id)) == 22
 
 
 def test_every_migration_leads_to_the_schema_of_a_new_store(tmp_path):
@@ -187,7 +215,7 @@ def test_every_migration_leads_to_the_schema_of_a_new_store(tmp_path):
 WRITE = """
 import sys
 from roofbench.benchmark.store.writer import Store
-from roofbench.benchmark.execution.tasks import Outcome
+from roofbench.benchmark.execution.tasks import Outcome, Score
 sys.path.insert(0, sys.argv[3])
 from test_store import identity
 with Store(sys.argv[1]) as store:

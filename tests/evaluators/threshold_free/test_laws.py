@@ -125,8 +125,8 @@ def test_turning_changes_nothing_and_scaling_scales(seed, angle, factor):
     after = evaluate([change(p) for p in detected], [change(p) for p in reference], building)
     assert after.counts == before.counts
     for key in ("true_positive", "false_positive", "false_negative"):
-        expected = before.tallies[f"areas.{key}"] * factor**2
-        assert after.tallies[f"areas.{key}"] == pytest.approx(expected, rel=1e-7, abs=1e-6)
+        expected = getattr(before.tallies.areas, key) * factor**2
+        assert getattr(after.tallies.areas, key) == pytest.approx(expected, rel=1e-7, abs=1e-6)
     if before.geometric.rmse is not None:
         assert after.geometric.rmse == pytest.approx(before.geometric.rmse * factor, rel=1e-6, abs=1e-7)
 

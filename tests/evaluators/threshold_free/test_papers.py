@@ -2,7 +2,9 @@
 
 import pytest
 
-from roofbench.evaluators.threshold_free.indices import index_values
+from roofbench.evaluators.overlay.areas import AreaTally
+from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
+from roofbench.evaluators.threshold_free.tallies import Counts, ThresholdFreeTallies
 
 #: Yu et al. 2013, table 1: counts that explain it, then the seven printed percentages.
 YU_2013 = {
@@ -38,18 +40,17 @@ YU_COLUMNS = (
 @pytest.mark.parametrize("data", YU_2013)
 def test_the_table_of_yu_2013_is_reproduced_digit_for_digit(data):
     counts, printed = YU_2013[data]
-    values = index_values(
-        {
-            "counts.detected": counts["D"],
-            "counts.true_positives": counts["D"] - counts["FP"] - counts["MD"],
-            "counts.false_positives": counts["FP"],
-            "counts.false_negatives": counts["FN"],
-            "counts.multiple_detections": counts["MD"],
-            "counts.overlapping_detections": counts["O_d"],
-            "counts.cross_lapping_detections": counts["C_ld"],
-            "counts.cross_lapped_references": counts["C_lr"],
-        }
+    numbers = Counts(
+        detected=counts["D"],
+        true_positives=counts["D"] - counts["FP"] - counts["MD"],
+        false_positives=counts["FP"],
+        false_negatives=counts["FN"],
+        multiple_detections=counts["MD"],
+        overlapping_detections=counts["O_d"],
+        cross_lapping_detections=counts["C_ld"],
+        cross_lapped_references=counts["C_lr"],
     )
+    values = ThresholdFree().summarise(ThresholdFreeTallies(counts=numbers)).values
     assert tuple(f"{100 * values[key]:.2f}" for key in YU_COLUMNS) == printed
 
 
@@ -65,14 +66,9 @@ PIXELS_2010 = {
 def test_the_pixel_table_of_2010_obeys_our_formulas_but_for_the_commission_error(scene):
     completeness, correctness, _, omission, commission, branching, miss = PIXELS_2010[scene]
     # Areas with the printed completeness and correctness: T = 1, M = 1/C_mp - 1, F = 1/C_rp - 1.
-    values = index_values(
-        {
-            "areas.true_positive": 1.0,
-            "areas.false_negative": 100 / completeness - 1,
-            "areas.false_positive": 100 / correctness - 1,
-        }
-    )
-    assert 100 * values["pixel.area_omission_error"] == pytest.approx(omission, abs=0.011)
-    assert 100 * values["pixel.branching_factor"] == pytest.approx(branching, abs=0.02)
-    assert 100 * values["pixel.miss_factor"] == pytest.approx(miss, abs=0.02)
-    assert 100 * values["pixel.area_commission_error"] > commission
+    areas = AreaTally(true_positive=1.0, false_negative=100 / completeness - 1, false_positive=100 / correctness - 1)
+    pixel = ThresholdFree().summarise(ThresholdFreeTallies(areas=areas)).pixel
+    assert 100 * pixel.area_omission_error == pytest.approx(omission, abs=0.011)
+    assert 100 * pixel.branching_factor == pytest.approx(branching, abs=0.02)
+    assert 100 * pixel.miss_factor == pytest.approx(miss, abs=0.02)
+    assert 100 * pixel.area_commission_error > commission

@@ -1,0 +1,183 @@
+"""Evaluation area and minimum size: which footprints count.
+
+- A reference is left out when its centre lies outside the evaluation area, or when it is smaller than the minimum size.
+- A detection without a match is left out when its centre lies outside the area, or when it overlaps only references
+  that are left out.
+
+What is left out is neither right nor wrong, and is reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...scenes.geodata.footprints import Footprints
+from ..tally import Tallies
+from .overlaps import Overlaps, common_ground, shared_areas
+
+__all__ = [
+    "Counted",
+    "LeftOut",
+    "clipped",
+    "counted_detections",
+    "counted_references",
+    "in_words",
+    "left_out_notes",
+    "remeasured",
+    "repair_notes",
+]
+
+_OUTSIDE = "left out: its centre lies outside the evaluation area"
+_SMALL = "left out: smaller than the minimum area"
+_ONLY_LEFT_OUT = "left out: overlaps only references that are left out"
+_REASONS = np.array(["", _OUTSIDE, _SMALL, _ONLY_LEFT_OUT], dtype=object)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOut(Tallies):
+    """Numbers of objects that are left out: detections, references outside the area, references that are too small."""
+
+    detected: int = 0
+    reference_outside: int = 0
+    reference_small: int = 0
+
+    @classmethod
+    def of(cls, detections: Counted, references: Counted) -> LeftOut:
+        """Count what is left out of both sides."""
+        return cls(
+            detected=int((~detections.mask).sum()),
+            reference_outside=int((references.code == 1).sum()),
+            reference_small=int((references.code == 2).sum()),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Counted:
+    """Which footprints of one side count.
+
+    Attributes
+    ----------
+    code : ndarray of int8, shape (n,)
+        0 where the footprint counts; 1 outside the area, 2 too small, 3 on left-out references only.
+    """
+
+    code: NDArray[np.int8]
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """True where the footprint counts, shape (n,)."""
+        counts: NDArray[np.bool_] = self.code == 0
+        return counts
+
+    @property
+    def reasons(self) -> NDArray[np.object_]:
+        """Why a footprint is left out, in words; empty where it counts."""
+        reasons: NDArray[np.object_] = _REASONS[self.code]
+        return reasons
+
+
+def counted_references(
+    reference: Footprints, *, area: shapely.Geometry | None = None, minimum_area: float = 0.0
+) -> Counted:
+    """Return which references count.
+
+    Parameters
+    ----------
+    reference : Footprints
+    area : polygon, optional
+        Evaluation area.
+    minimum_area : float
+        Smaller references are left out, m2.
+    """
+    code = np.zeros(len(reference), dtype=np.int8)
+    if minimum_area > 0:
+        code[reference.areas < minimum_area] = 2
+    if area is not None:
+        code[~_centres_inside(reference, area)] = 1
+    return Counted(code)
+
+
+def counted_detections(
+    detected: Footprints,
+    overlaps: Overlaps,
+    references: Counted,
+    *,
+    matched: NDArray[np.bool_],
+    area: shapely.Geometry | None = None,
+) -> Counted:
+    """Return which detections count.
+
+    Parameters
+    ----------
+    detected : Footprints
+    overlaps : Overlaps
+        Overlapping (detection, reference) pairs, left-out references included.
+    references : Counted
+    matched : ndarray of bool, shape (len(detected),)
+        Detections with a match, which always count.
+    area : polygon, optional
+        Evaluation area.
+    """
+    overlapping, on_counted = np.zeros((2, len(detected)), dtype=bool)
+    overlapping[overlaps.first] = True
+    on_counted[overlaps.first[references.mask[overlaps.second]]] = True
+    code = np.where(~matched & overlapping & ~on_counted, 3, 0).astype(np.int8)
+    if area is not None:
+        code[~matched & ~_centres_inside(detected, area)] = 1
+    return Counted(code)
+
+
+def _centres_inside(footprints: Footprints, area: shapely.Geometry) -> NDArray[np.bool_]:
+    centres = footprints.centres
+    inside: NDArray[np.bool_] = shapely.intersects_xy(area, centres[:, 0], centres[:, 1])
+    return inside
+
+
+def clipped(footprints: Footprints, area: shapely.Geometry) -> Footprints:
+    """Return the footprints cut at the evaluation area; those outside become empty."""
+    crossing = ~shapely.contains_properly(area, footprints.polygons)
+    inside = footprints.polygons.copy()
+    inside[crossing] = common_ground(inside[crossing], area)
+    return Footprints(polygons=inside, crs=footprints.crs, source=footprints.source)
+
+
+def remeasured(footprints: Footprints, within: Overlaps) -> Overlaps:
+    """Return the pairs of one set with the areas that they share after clipping."""
+    area = shared_areas(footprints, footprints, within.first, within.second)
+    return Overlaps(within.first, within.second, area, within.significant)
+
+
+def in_words(count: int, noun: str) -> str:
+    """Return a number with its noun.
+
+    >>> in_words(1, "reference"), in_words(3, "reference")
+    ('1 reference', '3 references')
+    """
+    return f"{count:d} {noun}" if count == 1 else f"{count:d} {noun}s"
+
+
+def left_out_notes(left_out: LeftOut) -> Iterator[str]:
+    """Yield what was left out, in words."""
+    if left_out.detected:
+        yield (
+            f"{in_words(left_out.detected, 'detection')} left out: outside the evaluation area, "
+            "or on references that are left out"
+        )
+    if left_out.reference_outside:
+        yield f"{in_words(left_out.reference_outside, 'reference')} outside the evaluation area left out"
+    if left_out.reference_small:
+        yield f"{in_words(left_out.reference_small, 'reference')} below the minimum area left out"
+
+
+def repair_notes(*sets: Footprints) -> Iterator[str]:
+    """Yield which features of the input were repaired or left out, in words."""
+    for footprints in sets:
+        for action in dict.fromkeys(repair.action for repair in footprints.repairs):
+            ids = [str(repair.id) for repair in footprints.repairs if repair.action == action]
+            more = f" and {len(ids) - 10} more" if len(ids) > 10 else ""
+            yield f"{footprints.source}: {in_words(len(ids), 'feature')} {action}: {', '.join(ids[:10])}{more}"

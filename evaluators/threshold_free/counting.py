@@ -1,0 +1,105 @@
+"""Counts and areas of the threshold-free evaluation (Awrangjeb et al. 2010, sections 4.2.1 and 4.2.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from ...scenes.geodata.raster import Grid
+from ..overlay.areas import AreaTally, exact_areas
+from ..overlay.left_out import clipped, remeasured
+from ..overlay.overlaps import shared_areas
+from ..overlay.pixels import pixel_areas
+from .object_graph import ObjectGraph
+from .tallies import Buildings, Counts
+
+__all__ = ["count_buildings", "count_objects", "measure_areas"]
+
+
+def count_objects(graph: ObjectGraph) -> Counts:
+    """Return the counts of section 4.2.1."""
+    overlaps, within = graph.overlaps, graph.within[0].only_significant
+    partner, building = graph.correspondence.of_detection, graph.reference.building_codes
+    matched = partner >= 0
+    multiple = graph.detections.mask & ~matched & (graph.correspondence.booked_on >= 0)
+
+    both = graph.detections.mask[within.first] & graph.detections.mask[within.second]
+    one, two = within.first[both], within.second[both]
+    # Natural overlap: two true positives on two parts of one building (a reference has one partner, so parts differ).
+    natural = matched[one] & matched[two]
+    natural[natural] = building[partner[one[natural]]] == building[partner[two[natural]]]
+    overlapping = np.union1d(one[~natural], two[~natural])
+
+    touched = np.unique(np.stack([overlaps.first, building[overlaps.second]], axis=1), axis=0)[:, 0]
+    cross_lapping = (np.bincount(touched, minlength=len(graph.detected)) > 1).sum()
+
+    other = partner[overlaps.first]
+    of_another_part = (other >= 0) & (other != overlaps.second) & (building[other] == building[overlaps.second])
+    claimants = np.bincount(overlaps.second[~of_another_part], minlength=len(graph.reference))
+
+    found = graph.correspondence.of_reference >= 0
+    return Counts(
+        detected=int(graph.detections.mask.sum()),
+        reference=int(graph.references.mask.sum()),
+        true_positives=int(matched.sum()),
+        false_positives=int((graph.detections.mask & ~matched & ~multiple).sum()),
+        false_negatives=int((graph.references.mask & ~found).sum()),
+        multiple_detections=int(multiple.sum()),
+        overlapping_detections=len(overlapping),
+        cross_lapping_detections=int(cross_lapping),
+        cross_lapped_references=int((claimants > 1).sum()),
+    )
+
+
+def count_buildings(graph: ObjectGraph) -> Buildings:
+    """Return how many reference buildings there are, and how many have all or any of their parts found."""
+    counted = graph.references.mask
+    found = graph.correspondence.of_reference >= 0
+    _, part_building = np.unique(graph.reference.building_codes[counted], return_inverse=True)
+    parts = np.bincount(part_building)
+    found_parts = np.bincount(part_building, weights=found[counted], minlength=len(parts))
+    return Buildings(
+        reference=len(parts),
+        complete_all=int((found_parts == parts).sum()),
+        complete_any=int((found_parts > 0).sum()),
+    )
+
+
+def measure_areas(graph: ObjectGraph, *, area: shapely.Geometry | None, lattice: Grid | None) -> AreaTally:
+    """Return T, F and M, clipped to the evaluation area.
+
+    Parameters
+    ----------
+    graph : ObjectGraph
+    area : polygon or None
+        Evaluation area.
+    lattice : Grid or None
+        Pixels to count; None for exact areas.
+    """
+    match, overlaps, within = graph.correspondence, graph.overlaps, graph.within
+    detected, reference, pairs = graph.detected, graph.reference, match.pairs
+    false_positives = np.flatnonzero(graph.detections.mask & (match.booked_on < 0))
+    false_negatives = np.flatnonzero(graph.references.mask & (match.of_reference < 0))
+    shared = overlaps.area[graph.matched_overlaps]
+    if area is not None:
+        detected, reference = clipped(detected, area), clipped(reference, area)
+        shared = shared_areas(detected, reference, *pairs)
+        within = remeasured(detected, within[0]), remeasured(reference, within[1])
+    if lattice is not None:
+        return pixel_areas(
+            detected.polygons,
+            reference.polygons,
+            pairs,
+            lattice,
+            false_positives=false_positives,
+            false_negatives=false_negatives,
+        )
+    return exact_areas(
+        detected,
+        reference,
+        pairs,
+        shared,
+        false_positives=false_positives,
+        false_negatives=false_negatives,
+        within=within,
+    )
