@@ -20,6 +20,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..scenes.geodata.crs import crs_label
+from ..scenes.geodata.density import point_spacing
 from ..scenes.geodata.raster import Elevation, Grid
 from ..scenes.geodata.surfaces import highest_surface, mean_intensity
 from ..scenes.scene import Scene
@@ -75,7 +76,7 @@ def _grid(scene: Scene) -> Grid:
     xmin, ymin, xmax, ymax = scene.extent
     cell = max(0.5, max(xmax - xmin, ymax - ymin) / _MOST_CELLS)
     if scene.points is not None:
-        spacing = np.sqrt((xmax - xmin) * (ymax - ymin) / max(len(scene.points), 1))
+        spacing = point_spacing(scene.points.x, scene.points.y, scene.extent) or 0.0
         cell = max(cell, float(np.ceil(10 * spacing) / 10))
     return Grid.covering(scene.extent, cell)
 

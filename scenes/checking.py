@@ -18,6 +18,7 @@ import shapely
 from ..core.errors import RoofbenchError
 from .folder import FILES, changed_files, open_scene, read_manifest
 from .geodata.crs import crs_label, same_crs
+from .geodata.density import point_counts
 from .geodata.footprints import Footprints
 from .geodata.points import PointCloud
 from .geodata.raster import Elevation, Grid, Image
@@ -98,8 +99,7 @@ def _points(cloud: PointCloud, scene: Scene) -> tuple[dict[str, Any], list[str]]
     xmin, ymin, xmax, ymax = scene.extent
     inside = (cloud.x >= xmin) & (cloud.x <= xmax) & (cloud.y >= ymin) & (cloud.y <= ymax)
     grid = Grid.covering(scene.extent, 2.0)
-    index, on_grid = grid.cells(cloud.x, cloud.y)
-    covered = np.count_nonzero(np.bincount(index[on_grid], minlength=1)) / (grid.rows * grid.columns)
+    covered = np.count_nonzero(point_counts(cloud.x, cloud.y, grid)) / (grid.rows * grid.columns)
     facts: dict[str, Any] = {"count": len(cloud), "density": len(cloud) / _size(scene), "coverage": covered}
     if cloud.return_number is not None:
         facts["first_return_density"] = np.count_nonzero(cloud.return_number == 1) / _size(scene)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Bitmap
 
+from ...scenes.geodata.density import point_spacing
 from ...scenes.geodata.raster import Grid, Image
 from ...scenes.geodata.surfaces import highest_surface
 from ...scenes.scene import Scene
@@ -84,7 +85,7 @@ def scene_picture(scene: Scene) -> ScenePicture | None:
         return _encoded(bitmap, f"orthoimage, {image.grid.gsd:g} m ({', '.join(image.bands)})", _QUALITY)
     if scene.points is None or not len(scene.points):
         return None
-    spacing = np.sqrt((xmax - xmin) * (ymax - ymin) / len(scene.points))
+    spacing = point_spacing(scene.points.x, scene.points.y, scene.extent) or 0.0
     grid = Grid.covering(scene.extent, max(pixel, float(np.ceil(10 * spacing) / 10)))
     surface = highest_surface(scene.points, grid).values
     if np.isnan(surface).all():

@@ -30,7 +30,7 @@ from .extension import Cover, Growth, extend_lines, last_step
 from .final_rectangles import FinalRules, final_rectangles
 from .initial_rectangles import INSIDE, initial_rectangles
 from .line_steps import line_steps
-from .masks import build_masks, ground_heights, point_spacing, sunken
+from .masks import build_masks, ground_heights, pulse_spacing, sunken
 from .rasters import Rasters
 from .segments import Segments, beyond_coverage, fit_segments, inside_first
 from .trace import Fate, Trace
@@ -320,7 +320,7 @@ class LineDetector(Detector):
         assert image is not None
         grid = image.grid
         tile_side = self.tile_size * PAPER_PIXEL
-        spacing = point_spacing(points, grid)
+        spacing = pulse_spacing(points, grid)
         surface = None if self.ground == "tile-mode" or not len(points) else scene.heights.ground
         ground = ground_heights(points, surface, method=self.ground, tile_side=tile_side)
         if self.ground == "point-dem" and self.below_ground < 1 and len(points):

@@ -34,10 +34,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
 
-__all__ = ["Masks", "build_masks", "ground_heights", "point_spacing", "sunken"]
+__all__ = ["Masks", "build_masks", "ground_heights", "pulse_spacing", "sunken"]
 
 #: Side of the cells in which points are counted to tell coverage and density, metres.
 _COVERAGE_CELL = 2.5
@@ -77,11 +78,10 @@ def _count(points: PointCloud, grid: Grid, cell: float) -> NDArray[np.int64]:
     coarse = Grid(
         grid.west, grid.north, cell, math.ceil(grid.rows * grid.gsd / cell), math.ceil(grid.columns * grid.gsd / cell)
     )
-    index, inside = coarse.cells(points.x, points.y)
-    return np.bincount(index[inside], minlength=coarse.rows * coarse.columns).reshape(coarse.shape)
+    return point_counts(points.x, points.y, coarse)
 
 
-def point_spacing(points: PointCloud, grid: Grid) -> float:
+def pulse_spacing(points: PointCloud, grid: Grid) -> float:
     """Return the typical distance between neighbouring pulses, metres.
 
     The square root of the area per first return in the median occupied cell; every point counts as a pulse when the
@@ -90,11 +90,7 @@ def point_spacing(points: PointCloud, grid: Grid) -> float:
     if points.return_number is not None and (points.return_number == 1).any():
         points = points.take(points.return_number == 1)
     cell = 2 * _COVERAGE_CELL
-    counts = _count(points, grid, cell)
-    occupied = counts[counts > 0]
-    if not len(occupied):
-        return cell
-    return float(cell / math.sqrt(np.median(occupied)))
+    return spacing_of_counts(_count(points, grid, cell), cell, "median") or cell
 
 
 def _coverage(points: PointCloud, grid: Grid) -> NDArray[np.uint8]:

@@ -28,9 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
-from ...scenes.ground.lowest_points import coverage
 from .workers import ALONE, Workers
 
 __all__ = ["FEWEST_POINTS", "HIGH", "LOW", "VOID", "Cells", "cell_size", "has_points", "make_cells"]
@@ -86,14 +86,9 @@ def cell_size(
     """
     coarse = Grid.covering(extent, 4.0)
     edges = [len(x) * part // workers.count for part in range(workers.count + 1)]
-    place = (coarse.west, coarse.north, coarse.gsd, coarse.rows, coarse.columns)
-    found = workers.map(lambda part: coverage(x[slice(*part)], y[slice(*part)], *place), pairwise(edges))
-    covered = np.count_nonzero(np.logical_or.reduce([seen for seen, _ in found]))
-    points = sum(count for _, count in found)
-    if points == 0:
-        return 1.0
-    spacing = math.sqrt(16.0 * covered / points)
-    return min(max(math.ceil(2 * spacing + 0.8) / 4, 0.5), 2.0)
+    found = workers.map(lambda part: point_counts(x[slice(*part)], y[slice(*part)], coarse), pairwise(edges))
+    spacing = spacing_of_counts(np.sum(found, axis=0), coarse.gsd)
+    return 1.0 if spacing is None else min(max(math.ceil(2 * spacing + 0.8) / 4, 0.5), 2.0)
 
 
 def make_cells(

@@ -14,7 +14,6 @@ Nothing is learned and nothing is random: the same points give the same footprin
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -24,6 +23,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ...core.parameters import parameter
+from ...scenes.geodata.density import point_spacing
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.outlines import coverage_of_mask, minimum_rectangles, trace
 from ...scenes.geodata.points import PointCloud
@@ -208,13 +208,10 @@ def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple
 
     The spacing is that of the covered part of the extent (2 m cells that hold points).
     """
-    coarse = Grid.covering(extent, 2.0)
-    index, inside = coarse.cells(points.x, points.y)
-    used = inside & np.isfinite(heights)
-    covered = np.count_nonzero(np.bincount(index[used], minlength=1))
-    if covered == 0:
+    used = np.isfinite(heights)
+    spacing = point_spacing(points.x[used], points.y[used], extent, square=2.0)
+    if spacing is None:
         return 1.0
-    spacing = math.sqrt(covered * 4.0 / np.count_nonzero(used))
     return min(max(round(1.4 * spacing / 0.05) * 0.05, 0.25), 2.0)
 
 

@@ -1,4 +1,4 @@
-"""Points put on a grid without copies of them: where there are any, the lowest of each cell, the mean near a surface.
+"""Points put on a grid without copies of them: the lowest of each cell, and the mean near a surface.
 
 Nouns
 -----
@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from ..geodata.density import point_spacing
 from ..geodata.raster import Elevation, Grid
 
-__all__ = ["coverage", "default_cell", "lowest_surface", "mean_above"]
+__all__ = ["default_cell", "lowest_surface", "mean_above"]
 
 _Coordinates = NDArray[np.float64]
 
@@ -32,39 +33,14 @@ _SUPPORT_HEIGHT, _SUPPORT, _SUPPORT_SHARE = 1.0, 3, 0.05
 _CHUNK = 1 << 18
 
 
-@kernel
-def coverage(x, y, west, north, side, rows, columns):  # type: ignore[no-untyped-def]
-    """Return which squares of a grid hold a point, shape (rows, columns), and how many points lie in any.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n,)
-        Metres; points that are not finite lie in none.
-    west, north, side : float
-        Upper left corner of the grid and side of a square, metres.
-    rows, columns : int
-    """
-    seen = np.zeros((rows, columns), dtype=np.bool_)
-    points = 0
-    for i in range(len(x)):
-        column, row = (x[i] - west) / side, (north - y[i]) / side
-        if 0 <= column < columns and 0 <= row < rows:
-            points += 1
-            seen[int(row), int(column)] = True
-    return seen, points
-
-
 def default_cell(x: _Coordinates, y: _Coordinates, extent: Sequence[float]) -> float:
     """Return the cell size in metres at which an average covered cell holds two points, at least 1 m.
 
-    Cells of 4 m without points do not count as covered, so that water and a ragged border do not coarsen the grid.
+    Squares of 4 m without points do not count as covered, so that water and a ragged border do not coarsen the grid.
     """
-    coarse = Grid.covering(extent, 4.0)
-    seen, points = coverage(x, y, coarse.west, coarse.north, coarse.gsd, coarse.rows, coarse.columns)
-    if points == 0:
-        return 1.0
-    density = points / (np.count_nonzero(seen) * 16.0)
-    return max(1.0, math.ceil(10 * math.sqrt(2.0 / density)) / 10)
+    spacing = point_spacing(x, y, extent) or 0.0
+    # A spacing of 1.4142136 m, as of one point in two square metres, is no reason for cells of more than 2 m.
+    return max(1.0, math.ceil(10 * math.sqrt(2) * spacing - 1e-9) / 10)
 
 
 def lowest_surface(x: _Coordinates, y: _Coordinates, z: _Coordinates, grid: Grid) -> NDArray[np.float32]:

@@ -6,11 +6,14 @@ Such outlines are as good as the classification and as the point spacing; whoeve
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ..geodata.density import point_spacing
 from ..geodata.footprints import Footprints
 from ..geodata.outlines import coverage_of_mask, simplify, trace
 from ..geodata.points import PointCloud
@@ -84,12 +87,9 @@ def outlines_of_class(
 
 
 def _cell(x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, float, float, float]) -> float:
-    """Return the cell size that holds two points where a typical point lies, by the counts of cells of 2 m."""
-    coarse = Grid.covering(extent, 2.0)
-    index, inside = coarse.cells(x, y)
-    index = index[inside]
-    density = float(np.median(np.bincount(index)[index])) / 4.0 if len(index) else 1.0
-    return float(np.clip(np.ceil(20 * np.sqrt(2.0 / density)) / 20, 0.25, 2.0))
+    """Return the cell size that holds two points where a typical point lies, 0.25 to 2 m in steps of 0.05 m."""
+    spacing = point_spacing(x, y, extent, square=2.0, statistic="median-point") or 1.0
+    return min(max(math.ceil(20 * math.sqrt(2) * spacing - 1e-9) / 20, 0.25), 2.0)
 
 
 def _padded(grid: Grid) -> Grid:

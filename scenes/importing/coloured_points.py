@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ..geodata.density import point_spacing
 from ..geodata.points import PointCloud
 from ..geodata.raster import Grid, Image
 
@@ -75,8 +76,5 @@ def image_from_points(
 
 def _size(x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, float, float, float]) -> float:
     """Return the cell size for the point density where there are points."""
-    coarse = Grid.covering(extent, 4.0)
-    index, inside = coarse.cells(x, y)
-    covered = int(np.count_nonzero(np.bincount(index[inside], minlength=1)))
-    spacing = 4.0 * float(np.sqrt(max(covered, 1) / max(int(inside.sum()), 1)))
+    spacing = point_spacing(x, y, extent) or 0.0
     return next((size for size in _SIZES if size >= 0.95 * spacing), _SIZES[-1])

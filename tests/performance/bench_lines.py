@@ -21,7 +21,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
     os.environ.setdefault(variable, "1")
 
 STAGES = {
-    "ground and masks": ("point_spacing", "ground_heights", "build_masks"),
+    "ground and masks": ("pulse_spacing", "ground_heights", "build_masks"),
     "prefix sums": ("prefix_sums", "vegetation_prefix"),
     "entropy": ("local_entropy", "grey_levels"),
     "contours and corners": ("trace_shapes", "find_corners", "fit_segments", "inside_first"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from naive import lines as naive_lines
 
-from roofbench.detectors.lines.masks import build_masks, ground_heights, point_spacing, sunken
+from roofbench.detectors.lines.masks import build_masks, ground_heights, pulse_spacing, sunken
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid
 
@@ -114,13 +114,13 @@ def test_the_neighbourhood_is_an_odd_number_of_pixels_at_any_ground_sampling_dis
         assert masks.neighbourhood == side
 
 
-def test_point_spacing_counts_pulses_and_not_returns():
+def test_pulse_spacing_counts_pulses_and_not_returns():
     x, y = (values.ravel() for values in np.meshgrid(np.arange(0.25, 30, 0.5), np.arange(0.25, 30, 0.5)))
     once = cloud(x, y, np.zeros_like(x))
-    assert point_spacing(once, GRID) == pytest.approx(0.5)
+    assert pulse_spacing(once, GRID) == pytest.approx(0.5)
     numbers = np.repeat(np.array([1, 2], dtype=np.uint8), len(x))
     twice = cloud(np.tile(x, 2), np.tile(y, 2), np.zeros(2 * len(x)), return_number=numbers)
-    assert point_spacing(twice, GRID) == pytest.approx(0.5)
+    assert pulse_spacing(twice, GRID) == pytest.approx(0.5)
 
 
 def test_the_ground_of_a_tile_is_the_mean_of_its_elevation():

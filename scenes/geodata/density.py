@@ -1,0 +1,90 @@
+"""Density of a point cloud: points per square of a coarse grid, and the point spacing that follows from them.
+
+Nouns
+-----
+square
+    Cell of a coarse grid over the extent, 2 to 5 m wide. It is *covered* when it holds a point: water, gaps between
+    flight strips and a ragged border do not count.
+point spacing
+    Typical distance between neighbouring points where there are any: the side of the area that one point has to
+    itself, metres.
+
+Nothing of the size of the cloud is made beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.kernels import kernel
+from .raster import Grid
+
+__all__ = ["Statistic", "point_counts", "point_spacing", "spacing_of_counts"]
+
+_Coordinates = NDArray[np.float64]
+
+#: How the squares are summarised: the *mean* of all covered ones; their *median*, which overlapping flight strips and
+#: half covered borders do not move; or the square of the *median-point*, for points that cover little, as roofs do.
+Statistic = Literal["mean", "median", "median-point"]
+
+
+def point_spacing(
+    x: _Coordinates, y: _Coordinates, extent: Sequence[float], *, square: float = 4.0, statistic: Statistic = "mean"
+) -> float | None:
+    """Return the point spacing in metres; None without a point in the extent.
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (n,)
+        Metres. For the spacing of pulses, give first returns only.
+    extent : sequence of float
+        ``(xmin, ymin, xmax, ymax)``, metres.
+    square : float
+        Side of the squares, metres.
+    statistic : {"mean", "median", "median-point"}
+
+    Examples
+    --------
+    >>> x, y = (values.ravel() for values in np.meshgrid(np.arange(0.25, 8, 0.5), np.arange(0.25, 8, 0.5)))
+    >>> point_spacing(x, y, (0, 0, 100, 100))
+    0.5
+    >>> point_spacing(x, y, (50, 50, 100, 100)) is None
+    True
+    """
+    grid = Grid.covering(extent, square)
+    return spacing_of_counts(point_counts(x, y, grid), square, statistic)
+
+
+def point_counts(x: _Coordinates, y: _Coordinates, grid: Grid) -> NDArray[np.int64]:
+    """Return the number of points in each cell of a grid, shape (rows, columns); points not finite lie in none."""
+    counts = np.zeros(grid.shape, dtype=np.int64)
+    _count(x, y, grid.west, grid.north, grid.gsd, counts)
+    return counts
+
+
+def spacing_of_counts(counts: NDArray[np.int64], square: float, statistic: Statistic = "mean") -> float | None:
+    """Return the point spacing in metres of counts per square of so many metres; None without a point."""
+    covered = counts[counts > 0]
+    if not len(covered):
+        return None
+    if statistic == "mean":
+        return math.sqrt(square * square * len(covered) / int(covered.sum()))
+    if statistic == "median":
+        return float(square / math.sqrt(np.median(covered)))
+    ordered = np.sort(covered)
+    return float(square / math.sqrt(ordered[np.searchsorted(np.cumsum(ordered), int(covered.sum()) / 2)]))
+
+
+@kernel
+def _count(x: _Coordinates, y: _Coordinates, west: float, north: float, side: float, counts: NDArray[np.int64]) -> None:
+    """Add the points to the counts of their squares, shape (rows, columns)."""
+    rows, columns = counts.shape
+    for i in range(len(x)):
+        column, row = (x[i] - west) / side, (north - y[i]) / side
+        if 0 <= column < columns and 0 <= row < rows:
+            counts[int(row), int(column)] += 1
