@@ -90,7 +90,7 @@ def mean_in_boxes(prefix: NDArray[np.int32], boxes: NDArray[np.float64]) -> NDAr
 
 @kernel
 def is_vegetation(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> bool:
-    """Tell whether the cells in a box look like vegetation."""
+    """Return whether the cells in a box look like vegetation."""
     if mean_in_box(cover.vegetation, box) <= rules.vegetation:
         return False
     return len(cover.entropy) == 0 or mean_in_box(cover.entropy, box) > rules.entropy
@@ -98,14 +98,14 @@ def is_vegetation(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> bool
 
 @kernel
 def passes(cover: Cover, rules: Growth, strip: NDArray[np.float64]) -> bool:
-    """Tell whether a part of a strip may be added."""
+    """Return whether a part of a strip may be added."""
     black, _, cells = sum_in_box(cover.black, strip)
     return cells > 0 and black > rules.black_share * cells and not is_vegetation(cover, rules, strip)
 
 
 @kernel
 def parts_pass(cover: Cover, rules: Growth, strip: NDArray[np.float64], start: int) -> bool:
-    """Tell whether each part of a strip passes; `start` is where its interval along the side begins, `U0` or `V0`."""
+    """Return whether each part of a strip passes; `start` is where its interval along the side begins, `U0` or `V0`."""
     first, last = strip[start], strip[start + 1]
     parts = max(1, int((last - first) / rules.part))
     width = (last - first) / parts
@@ -118,19 +118,20 @@ def parts_pass(cover: Cover, rules: Growth, strip: NDArray[np.float64], start: i
 
 
 @kernel
-def extend_side(cover: Cover, rules: Growth, box: NDArray[np.float64], side: int) -> None:
-    """Move one end (`U0`, `U1`, `V0` or `V1`) of a box outwards, in place, as far as the strips pass."""
+def extended_side(cover: Cover, rules: Growth, box: NDArray[np.float64], side: int) -> float:
+    """Return how far one end (`U0`, `U1`, `V0` or `V1`) of a box can move outwards while the strips pass."""
     outwards = 1.0 if side in (U1, V1) else -1.0
-    step = rules.step
+    step, reached = rules.step, box[side]
     strip = box.copy()
     opposite = U0 + U1 - side if side in (U0, U1) else V0 + V1 - side
     while step >= rules.least_step:
-        end = box[side] + outwards * step
-        strip[side], strip[opposite] = end, box[side]
+        end = reached + outwards * step
+        strip[side], strip[opposite] = end, reached
         if parts_pass(cover, rules, strip, V0 if side in (U0, U1) else U0):
-            box[side] = end
+            reached = end
         else:
             step /= 2
+    return float(reached)
 
 
 @kernel
@@ -140,18 +141,18 @@ def extend_lines(cover: Cover, rules: Growth, lines: NDArray[np.float64], depth:
     for i in range(len(lines)):
         box = lines[i].copy()
         box[V1] = depth
-        extend_side(cover, rules, box, U0)
-        extend_side(cover, rules, box, U1)
-        out[i, U0], out[i, U1] = box[U0], box[U1]
+        out[i, U0] = extended_side(cover, rules, box, U0)
+        out[i, U1] = extended_side(cover, rules, box, U1)
     return out
 
 
 @kernel
-def extend_rectangle(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> None:
-    """Extend the side opposite to the line, then both lateral ones, in place."""
-    extend_side(cover, rules, box, V1)
-    extend_side(cover, rules, box, U0)
-    extend_side(cover, rules, box, U1)
+def extend_rectangle(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rectangle with the side opposite to its line extended, then both lateral ones."""
+    out = box.copy()
+    for side in (V1, U0, U1):
+        out[side] = extended_side(cover, rules, out, side)
+    return out
 
 
 def band(lines: Boxes, inner: float, outer: float) -> Boxes:

@@ -79,7 +79,7 @@ def shrink(box: NDArray[np.float64], share: float) -> NDArray[np.float64]:
 
 @kernel
 def lies_inside(inner: NDArray[np.float64], outer: NDArray[np.float64]) -> bool:
-    """Tell whether all corners of one box are in the other."""
+    """Return whether all corners of one box are in the other."""
     slack = 1e-9
     for along in (inner[U0], inner[U1]):
         for across in (inner[V0], inner[V1]):
@@ -123,7 +123,7 @@ def strip_shares(
 
 
 @kernel
-def extend_final_side(
+def extended_final_side(
     colours: Colours,
     primary: NDArray[np.uint8],
     secondary: NDArray[np.uint8],
@@ -131,23 +131,24 @@ def extend_final_side(
     rules: FinalRules,
     box: NDArray[np.float64],
     side: int,
-) -> None:
-    """Move one side of a box outwards, in place, as far as the strips pass."""
+) -> float:
+    """Return how far one side of a box can move outwards while the strips pass."""
     outwards = 1.0 if side in (U1, V1) else -1.0
     opposite = U0 + U1 - side if side in (U0, U1) else V0 + V1 - side
-    width, before = rules.strip, 1.0
+    width, before, reached = rules.strip, 1.0, box[side]
     strip = box.copy()
     while width >= rules.least_strip:
-        end = box[side] + outwards * width
-        strip[side], strip[opposite] = end, box[side]
+        end = reached + outwards * width
+        strip[side], strip[opposite] = end, reached
         in_range, black, filled = strip_shares(colours, primary, secondary, within, strip)
         rises = black > before + rules.rise
         if rises and before < rules.gap_share:
-            return
+            break
         if in_range > rules.colour_share and filled > rules.black_share and not rises:
-            box[side], before = end, black
+            reached, before = end, black
         else:
             width /= 2
+    return float(reached)
 
 
 @kernel
@@ -169,10 +170,10 @@ def final_rectangles(
     Returns
     -------
     rectangles : ndarray, shape (m, 8)
-    fate : ndarray of int64, shape (n,)
+    final_of : ndarray of int64, shape (n,)
         Index of the final rectangle of each initial one, or `DROPPED`.
     """
-    out, fate = np.empty((len(initial), 8)), np.full(len(initial), DROPPED)
+    out, final_of = np.empty((len(initial), 8)), np.full(len(initial), DROPPED)
     found = 0
     for i in order:
         box = shrink(initial[i], rules.reduction)
@@ -186,7 +187,7 @@ def final_rectangles(
             continue
         within = dominant_ranges(colours, box, rules.part_share, rules.total_share)
         for side in (V0, V1, U0, U1):
-            extend_final_side(colours, primary, secondary, within, rules, box, side)
-        out[found], fate[i] = box, found
+            box[side] = extended_final_side(colours, primary, secondary, within, rules, box, side)
+        out[found], final_of[i] = box, found
         found += 1
-    return out[:found].copy(), fate
+    return out[:found].copy(), final_of

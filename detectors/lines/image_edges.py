@@ -100,10 +100,11 @@ def _unused_neighbours(edges: NDArray[np.uint8], row: int, column: int) -> int:
 
 @kernel
 def link_pixels(edges: NDArray[np.uint8], least: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Link edge pixels to chains of at least `least` pixels: points (n, 2) at pixel centres, and offsets.
+    """Return the chains of at least `least` edge pixels: points (n, 2) at pixel centres, and offsets.
 
-    Ends of chains are started from first, closed ones last; used pixels become 2 in `edges`.
+    Chains are followed from their ends first; closed ones, which have no end, last.
     """
+    edges = edges.copy()  # used pixels become 2
     rows, columns = edges.shape
     capacity = 0
     for row in range(rows):

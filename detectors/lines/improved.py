@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.parameters import parameter
-from ...scenes.geodata.raster import Image
+from ...scenes.geodata.raster import Grid, Image
 from .adjustment import adjust_to_neighbours, adjust_to_shape
 from .boxes import Boxes, lengths, prefix_sums
 from .entropy import grey_levels, local_entropy
@@ -23,8 +23,8 @@ from .image_edges import ImageEdges, extract_edges
 from .line_detector import PAPER_PIXEL, LineDetector
 from .rasters import Rasters
 from .segments import Segments
-from .texture import Texture, judge
-from .trace import Fate
+from .texture import Texture, TextureRules, texture_of
+from .trace import Adjusted, Votes
 from .voting import cast_votes, longest_image_lines
 
 __all__ = ["Improved"]
@@ -107,12 +107,12 @@ class Improved(LineDetector):
         sides = [band(lines, width, 0.0)]
         if self.vegetation_side == "either":
             sides.append(band(lines, 0.0, width))
-        green, leafy = np.zeros(len(lines), dtype=np.bool_), np.zeros(len(lines), dtype=np.bool_)
+        green, tree_edges = np.zeros(len(lines), dtype=np.bool_), np.zeros(len(lines), dtype=np.bool_)
         for side in sides:
             is_green = mean_in_boxes(rasters.cover.vegetation, side) > self.vegetation_threshold
             green |= is_green
-            leafy |= is_green & (mean_in_boxes(rasters.cover.entropy, side) > self._entropy_limit())
-        return leafy, green & ~leafy
+            tree_edges |= is_green & (mean_in_boxes(rasters.cover.entropy, side) > self._entropy_limit())
+        return tree_edges, green
 
     def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
         tolerance = np.radians(self.adjustment_angle)
@@ -140,45 +140,34 @@ class Improved(LineDetector):
             straight=(self.corner_angle, 360.0 - self.corner_angle),
         )
 
-    def _votes(
-        self,
-        lines: Boxes,
-        rotation: NDArray[np.float64],
-        edges: ImageEdges | None,
-        shapes: NDArray[np.int64],
-        fates: NDArray[np.int64],
-        gsd: float,
-    ) -> NDArray[np.float64] | None:
+    def _votes(self, adjusted: Adjusted, edges: ImageEdges | None, gsd: float) -> Votes | None:
         if not self.voting:
             return None
         assert edges is not None
-        alive = fates == Fate.RECTANGLE
-        image_lengths = longest_image_lines(lines, edges.lines, half_width=self.band_width / 2 / gsd)
-        votes = cast_votes(
-            lengths(lines) * gsd,
-            rotation,
+        image_lengths = longest_image_lines(adjusted.lines, edges.lines, half_width=self.band_width / 2 / gsd)
+        return cast_votes(
+            lengths(adjusted.lines) * gsd,
+            adjusted.rotation,
             image_lengths * gsd,
-            shapes,
-            alive,
+            adjusted.shapes,
+            adjusted.remaining,
             tolerance=np.radians(self.adjustment_angle),
             least=self.minimum_side,
             length_as_printed=self.vote_length == "printed",
         )
-        fates[alive & ~(np.nan_to_num(votes).mean(axis=1) > self.majority)] = Fate.OUTVOTED
-        return votes
 
-    def _judged(self, candidates: Boxes, edges: ImageEdges | None, rasters: Rasters) -> Texture | None:
+    def _majority(self, votes: Votes) -> NDArray[np.bool_]:
+        return np.asarray(np.nan_to_num(votes).mean(axis=1) > self.majority)
+
+    def _texture(self, candidates: Boxes, edges: ImageEdges | None, grid: Grid) -> Texture | None:
         if not self.texture:
             return None
         assert edges is not None
-        return judge(
-            candidates,
-            edges,
-            rasters.image.grid.shape,
-            rasters.gsd,
+        rules = TextureRules(
             margin=self.texture_margin,
             least=self.minimum_side,
             most_edges=self.most_edges,
             area_per_edge=self.area_per_edge,
             peak_ratio=self.peak_ratio,
         )
+        return texture_of(candidates, edges, grid, rules)

@@ -65,11 +65,11 @@ def initial_rectangles(
     Returns
     -------
     rectangles : ndarray, shape (m, 8)
-    fate : ndarray of int64, shape (n,)
+    made : ndarray of int64, shape (n,)
         Index of the rectangle that each line made, `INSIDE` or `TOO_NARROW`.
     """
     n = len(lines)
-    rectangles, fate = np.empty((n, 8)), np.full(n, INSIDE)
+    rectangles, made = np.empty((n, 8)), np.full(n, INSIDE)
     found = 0
     for i in order:
         inside = False
@@ -81,10 +81,10 @@ def initial_rectangles(
             continue
         box = lines[i].copy()
         box[V0], box[V1] = 0.0, depth
-        extend_rectangle(cover, rules, box)
+        box = extend_rectangle(cover, rules, box)
         if min(box[U1] - box[U0], box[V1] - box[V0]) < least_side:
-            fate[i] = TOO_NARROW
+            made[i] = TOO_NARROW
         else:
-            rectangles[found], fate[i] = box, found
+            rectangles[found], made[i] = box, found
             found += 1
-    return rectangles[:found].copy(), fate
+    return rectangles[:found].copy(), made

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...core.parameters import parameter
 from ...scenes.geodata.footprints import Footprints
-from ...scenes.geodata.raster import Image
+from ...scenes.geodata.raster import Grid, Image
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..steps import Step
@@ -28,12 +28,12 @@ from .corners import find_corners
 from .duplicates import find_duplicates
 from .extension import Cover, Growth, extend_lines, last_step
 from .final_rectangles import FinalRules, final_rectangles
-from .initial_rectangles import INSIDE, initial_rectangles
+from .initial_rectangles import INSIDE, TOO_NARROW, initial_rectangles
 from .line_steps import line_steps
 from .masks import build_masks, ground_heights, pulse_spacing, sunken
 from .rasters import Rasters
 from .segments import Segments, beyond_coverage, fit_segments, inside_first
-from .trace import Fate, Trace
+from .trace import Adjusted, Outcome, Trace, Votes
 from .vegetation import vegetation_prefix
 
 if TYPE_CHECKING:
@@ -229,23 +229,29 @@ class LineDetector(Detector):
 
     def run(self, rasters: Rasters) -> Trace:
         """Run all steps that follow the masks, keeping the intermediate results."""
-        segments, fates = self._fitted_lines(rasters)
-        leafy, rescued = self._tree_edges(rasters, segments.lines)
-        rescued &= fates == Fate.RECTANGLE
-        fates[(fates == Fate.RECTANGLE) & leafy] = Fate.VEGETATION
+        segments, on_border = self._fitted_lines(rasters)
+        tree_edges, green = self._tree_edges(rasters, segments.lines)
+        outcomes = np.where(on_border, Outcome.BORDER, np.where(tree_edges, Outcome.VEGETATION, Outcome.RECTANGLE))
 
         rotation = np.full(len(segments), np.nan)
-        alive = np.flatnonzero(fates == Fate.RECTANGLE)
-        rotation[alive] = self._rotation(segments.take(alive), rasters.gsd)
-        fates[alive[np.isnan(rotation[alive])]] = Fate.UNADJUSTED
-        alive = np.flatnonzero(fates == Fate.RECTANGLE)
+        remaining = np.flatnonzero(outcomes == Outcome.RECTANGLE)
+        rotation[remaining] = self._rotation(segments.take(remaining), rasters.gsd)
+        outcomes[remaining[np.isnan(rotation[remaining])]] = Outcome.UNADJUSTED
+        remaining = np.flatnonzero(outcomes == Outcome.RECTANGLE)
         lines = segments.lines.copy()
-        lines[alive] = self._extended(rasters, rotate(lines[alive], rotation[alive]))
+        lines[remaining] = self._extended(rasters, rotate(lines[remaining], rotation[remaining]))
 
         edges = self._image_edges(rasters)
-        votes = self._votes(lines, rotation, edges, segments.shapes, fates, rasters.gsd)
-        initial, initial_fates, candidates = self._rectangles(rasters, lines, fates)
-        texture = self._judged(candidates, edges, rasters)
+        adjusted = Adjusted(lines, segments.shapes, rotation, outcomes == Outcome.RECTANGLE)
+        votes = self._votes(adjusted, edges, rasters.gsd)
+        if votes is not None:
+            outcomes[adjusted.remaining & ~self._majority(votes)] = Outcome.OUTVOTED
+        remaining = np.flatnonzero(outcomes == Outcome.RECTANGLE)
+        initial, made = self._initial_rectangles(rasters, lines[remaining])
+        outcomes[remaining[made == INSIDE]] = Outcome.INSIDE
+        outcomes[remaining[made == TOO_NARROW]] = Outcome.NARROW
+        candidates, candidate_of = self._final_rectangles(rasters, initial)
+        texture = self._texture(candidates, edges, rasters.image.grid)
         buildings = np.ones(len(candidates), dtype=np.bool_) if texture is None else np.any(texture.passed, axis=1)
         duplicates = np.zeros(len(candidates), dtype=np.bool_)
         duplicates[buildings] = find_duplicates(
@@ -258,10 +264,10 @@ class LineDetector(Detector):
             fitted=segments.lines,
             lines=lines,
             shapes=segments.shapes,
-            fates=fates,
-            rescued=rescued,
+            outcomes=outcomes,
+            smooth_green=green & ~tree_edges & ~on_border,
             initial=initial,
-            initial_fates=initial_fates,
+            candidate_of=candidate_of,
             candidates=candidates,
             duplicates=duplicates,
             kept=buildings & ~duplicates,
@@ -271,7 +277,7 @@ class LineDetector(Detector):
 
     @abstractmethod
     def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return which lines are tree edges, and which are green but not."""
+        """Return which lines are tree edges, and which are green, whatever their texture."""
 
     @abstractmethod
     def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
@@ -281,20 +287,16 @@ class LineDetector(Detector):
         """Return the edges of the image; none where nothing asks for them."""
         return None
 
-    def _votes(
-        self,
-        lines: Boxes,
-        rotation: NDArray[np.float64],
-        edges: ImageEdges | None,
-        shapes: NDArray[np.int64],
-        fates: NDArray[np.int64],
-        gsd: float,
-    ) -> NDArray[np.float64] | None:
-        """Return the votes of each line, none without voting; write the fates of those outvoted into `fates`."""
+    def _votes(self, adjusted: Adjusted, edges: ImageEdges | None, gsd: float) -> Votes | None:
+        """Return the votes on each line; none without voting."""
         return None
 
-    def _judged(self, candidates: Boxes, edges: ImageEdges | None, rasters: Rasters) -> Texture | None:
-        """Return the texture of the candidates, none where they are not judged by it."""
+    def _majority(self, votes: Votes) -> NDArray[np.bool_]:
+        """Return which lines have a majority."""
+        return np.ones(len(votes), dtype=np.bool_)
+
+    def _texture(self, candidates: Boxes, edges: ImageEdges | None, grid: Grid) -> Texture | None:
+        """Return the texture of the candidates; none where it is not tested."""
         return None
 
     def trace(self, scene: Scene) -> Trace:
@@ -355,8 +357,8 @@ class LineDetector(Detector):
     def _entropy_limit(self) -> float:
         return 0.0
 
-    def _fitted_lines(self, rasters: Rasters) -> tuple[Segments, NDArray[np.int64]]:
-        """Return the lines around the black shapes, and their fates so far."""
+    def _fitted_lines(self, rasters: Rasters) -> tuple[Segments, NDArray[np.bool_]]:
+        """Return the lines around the black shapes, and which of them are on the border of the points or the image."""
         gsd = rasters.gsd
         black = rasters.masks.primary
         curves = trace_shapes(black, shortest=self.minimum_side, gsd=gsd, sample=self._sample(rasters))
@@ -372,31 +374,26 @@ class LineDetector(Detector):
         )
         reach = max(1.0, self.inside_reach * PAPER_PIXEL / gsd)
         lines = inside_first(segments.lines, black, reach=reach, outset=_OUTSET)
-        fates = np.full(len(lines), Fate.RECTANGLE, dtype=np.int64)
-        fates[beyond_coverage(lines, rasters.masks.coverage, reach)] = Fate.BORDER
-        return Segments(lines, segments.shapes), fates
+        return Segments(lines, segments.shapes), beyond_coverage(lines, rasters.masks.coverage, reach)
 
-    def _rectangles(
-        self, rasters: Rasters, lines: Boxes, fates: NDArray[np.int64]
-    ) -> tuple[Boxes, NDArray[np.int64], Boxes]:
-        """Return initial rectangles of the lines still alive, the final one of each (-1: none), and the final ones.
-
-        The fates of lines that make no rectangle are written into `fates`.
-        """
-        gsd = rasters.gsd
-        alive = np.flatnonzero(fates == Fate.RECTANGLE)
-        growth = self._growth(rasters)
+    def _initial_rectangles(self, rasters: Rasters, lines: Boxes) -> tuple[Boxes, NDArray[np.int64]]:
+        """Return the initial rectangles, and the index of the one of each line, `INSIDE` or `TOO_NARROW`."""
+        gsd, growth = rasters.gsd, self._growth(rasters)
         initial, made = initial_rectangles(
             rasters.cover,
             growth,
-            lines[alive],
-            by_length(lines[alive]),
+            lines,
+            by_length(lines),
             self.initial_width / gsd,
             self.minimum_side / gsd,
             last_step(growth) + 1.0 if self.inside_margin is None else self.inside_margin / gsd,
             self.inside_share,
         )
-        fates[alive[made < 0]] = np.where(made[made < 0] == INSIDE, Fate.INSIDE, Fate.NARROW)
+        return initial, made
+
+    def _final_rectangles(self, rasters: Rasters, initial: Boxes) -> tuple[Boxes, NDArray[np.int64]]:
+        """Return the final rectangles, and the index of the one of each initial rectangle, or `DROPPED`."""
+        gsd = rasters.gsd
         rules = FinalRules(
             reduction=self.reduction,
             part_share=self.part_share,
@@ -410,10 +407,10 @@ class LineDetector(Detector):
             whole_initial=self.compare == "whole",
         )
         longest_first = np.argsort(-np.maximum(lengths(initial), widths(initial)), kind="stable")
-        final, final_fates = final_rectangles(
+        final, final_of = final_rectangles(
             rasters.colours, rasters.masks.primary, rasters.masks.secondary, rules, initial, longest_first
         )
-        return initial, final_fates, final
+        return final, final_of
 
     def _sample(self, rasters: Rasters) -> float:
         if self.curve_step is not None:

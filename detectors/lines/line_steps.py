@@ -28,20 +28,20 @@ from ..steps import (
 )
 from .boxes import Boxes, box_centres, box_corners, lengths, widths
 from .texture import BIN_COUNT, Texture
-from .trace import Fate, Trace
+from .trace import Outcome, Trace
 
 __all__ = ["line_steps"]
 
-_FATE_ROLES = {
-    Fate.RECTANGLE: Role.RESULT,
-    Fate.INSIDE: Role.REPEATED,
-    Fate.NARROW: Role.SMALL,
-    Fate.VEGETATION: Role.VEGETATION,
-    Fate.UNADJUSTED: Role.CANDIDATE,
-    Fate.OUTVOTED: Role.REMOVED,
-    Fate.BORDER: Role.BORDER,
+_ROLES = {
+    Outcome.RECTANGLE: Role.RESULT,
+    Outcome.INSIDE: Role.REPEATED,
+    Outcome.NARROW: Role.SMALL,
+    Outcome.VEGETATION: Role.VEGETATION,
+    Outcome.UNADJUSTED: Role.CANDIDATE,
+    Outcome.OUTVOTED: Role.REMOVED,
+    Outcome.BORDER: Role.BORDER,
 }
-_DROPPED = (Fate.VEGETATION, Fate.UNADJUSTED, Fate.OUTVOTED, Fate.NARROW)
+_DROPPED = (Outcome.VEGETATION, Outcome.UNADJUSTED, Outcome.OUTVOTED, Outcome.NARROW)
 #: Histograms shown of each kind of candidates, kept and dropped, the largest ones.
 _SHOWN = 6
 
@@ -56,7 +56,7 @@ def line_steps(trace: Trace) -> Iterator[Step]:
         _orthoimage(trace, faint=True),
         *_fitted_lines(trace),
     )
-    extended = np.isin(trace.fates, (Fate.RECTANGLE, Fate.INSIDE, Fate.NARROW, Fate.OUTVOTED))
+    extended = np.isin(trace.outcomes, (Outcome.RECTANGLE, Outcome.INSIDE, Outcome.NARROW, Outcome.OUTVOTED))
     gained = float((lengths(trace.lines[extended]) - lengths(trace.fitted[extended])).sum()) * trace.grid.gsd
     yield _map(
         trace,
@@ -66,7 +66,7 @@ def line_steps(trace: Trace) -> Iterator[Step]:
         LineLayer(_lines(trace, trace.lines[extended]), f"adjusted and extended, {gained:.0f} m gained", Role.RESULT),
         LineLayer(_lines(trace, trace.fitted[extended]), "as fitted", Role.CANDIDATE),
     )
-    inside = trace.initial_fates < 0
+    inside = trace.candidate_of < 0
     yield _map(
         trace,
         "initial-rectangles",
@@ -133,12 +133,12 @@ def _masks(trace: Trace) -> Step:
 
 
 def _fitted_lines(trace: Trace) -> Iterator[Layer]:
-    for fate, role in _FATE_ROLES.items():
-        chosen = trace.fates == fate
+    for outcome, role in _ROLES.items():
+        chosen = trace.outcomes == outcome
         if chosen.any():
-            yield LineLayer(_lines(trace, trace.fitted[chosen]), fate.label, role, marked=fate in _DROPPED)
-    if trace.rescued.any():
-        places = _places(trace, box_centres(trace.fitted[trace.rescued]))
+            yield LineLayer(_lines(trace, trace.fitted[chosen]), outcome.label, role, marked=outcome in _DROPPED)
+    if trace.smooth_green.any():
+        places = _places(trace, box_centres(trace.fitted[trace.smooth_green]))
         yield MarkerLayer(places, "kept by its low entropy", Role.INPUT, "diamond")
 
 
@@ -151,8 +151,8 @@ def _voted_lines(trace: Trace, votes: NDArray[np.float64]) -> Iterator[Layer]:
         values=votes[voted].mean(axis=1),
         scale=Scale(label="mean vote", low=0, high=1, kind="diverging"),
     )
-    outvoted = trace.fates == Fate.OUTVOTED
-    yield MarkerLayer(_places(trace, box_centres(trace.lines[outvoted])), Fate.OUTVOTED.label, Role.REMOVED)
+    outvoted = trace.outcomes == Outcome.OUTVOTED
+    yield MarkerLayer(_places(trace, box_centres(trace.lines[outvoted])), Outcome.OUTVOTED.label, Role.REMOVED)
 
 
 def _final(trace: Trace) -> Step:

@@ -43,7 +43,8 @@ class Original(LineDetector):
 
     def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         beside = mean_in_boxes(rasters.cover.vegetation, band(lines, self.band_width / rasters.gsd, 0.0))
-        return beside > self.vegetation_threshold, np.zeros(len(lines), dtype=np.bool_)
+        green = beside > self.vegetation_threshold
+        return green, green
 
     def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
         return adjust_to_neighbours(

@@ -46,33 +46,39 @@ class Segments:
 
 
 @kernel
-def fit_line(
-    points: NDArray[np.float64], ends: NDArray[np.float64], first: int, count: int, start: int, n: int
-) -> NDArray[np.float64]:
-    """Fit a line to `count` points of the closed or open curve ``points[start:start + n]``, from index `first` on.
+def fit_line(points: NDArray[np.float64], raw: NDArray[np.float64], first: int, count: int) -> NDArray[np.float64]:
+    """Return the line fitted to a piece of a curve, a box without width, shape (8,).
 
-    `ends` is the same curve before smoothing, which pulls it away from its corners: the line is cut where its first and
-    last point project onto it.
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        A closed or open curve.
+    raw : ndarray, shape (n, 2)
+        The same curve before smoothing, which moves it away from its corners. The line ends where the first and the
+        last raw point project onto it.
+    first, count : int
+        Index of the first point of the piece, and its number of points; indices wrap around.
     """
+    n = len(points)
     mx = my = 0.0
     for k in range(count):
-        at = start + (first + k) % n
+        at = (first + k) % n
         mx += points[at, 0]
         my += points[at, 1]
     mx /= count
     my /= count
     xx = xy = yy = 0.0
     for k in range(count):
-        at = start + (first + k) % n
+        at = (first + k) % n
         dx, dy = points[at, 0] - mx, points[at, 1] - my
         xx += dx * dx
         xy += dx * dy
         yy += dy * dy
     angle = 0.5 * math.atan2(2 * xy, xx - yy)
     ux, uy = math.cos(angle), math.sin(angle)
-    a, b = start + first % n, start + (first + count - 1) % n
-    t0 = (ends[a, 0] - mx) * ux + (ends[a, 1] - my) * uy
-    t1 = (ends[b, 0] - mx) * ux + (ends[b, 1] - my) * uy
+    a, b = first % n, (first + count - 1) % n
+    t0 = (raw[a, 0] - mx) * ux + (raw[a, 1] - my) * uy
+    t1 = (raw[b, 0] - mx) * ux + (raw[b, 1] - my) * uy
     if t1 < t0:
         ux, uy, t0, t1 = -ux, -uy, -t0, -t1
     middle, half = (t0 + t1) / 2, (t1 - t0) / 2
@@ -83,15 +89,14 @@ def fit_line(
 
 
 @kernel
-def _deviation(
-    points: NDArray[np.float64], first: int, count: int, start: int, n: int, line: NDArray[np.float64]
-) -> tuple[float, int]:
+def _deviation(points: NDArray[np.float64], first: int, count: int, line: NDArray[np.float64]) -> tuple[float, int]:
     """Return the root mean square distance of a piece of curve from its line, and its point farthest from its chord."""
+    n = len(points)
     total, farthest, most = 0.0, 0, -1.0
-    a, b = start + first % n, start + (first + count - 1) % n
+    a, b = first % n, (first + count - 1) % n
     dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     for k in range(count):
-        at = start + (first + k) % n
+        at = (first + k) % n
         off = (points[at, 1] - line[OY]) * line[UX] - (points[at, 0] - line[OX]) * line[UY]
         total += off * off
         aside = abs((points[at, 1] - points[a, 1]) * dx - (points[at, 0] - points[a, 0]) * dy)
@@ -103,28 +108,27 @@ def _deviation(
 @kernel
 def _fit_pieces(
     points: NDArray[np.float64],
-    ends: NDArray[np.float64],
+    raw: NDArray[np.float64],
     first: int,
     count: int,
-    start: int,
-    n: int,
     shortest: float,
     deviation: float,
-    lines: list[NDArray[np.float64]],
-) -> None:
-    """Append the lines of a piece of curve, split where it is farthest from its chord while it deviates too much."""
+) -> list[NDArray[np.float64]]:
+    """Return the lines of a piece of curve, split where it is farthest from its chord while it deviates too much."""
+    lines = [np.empty(8) for _ in range(0)]
     waiting = [(first, count)]
     while len(waiting) > 0:
         piece, length = waiting.pop()
         if length < 2:
             continue
-        line = fit_line(points, ends, piece, length, start, n)
-        off, farthest = _deviation(points, piece, length, start, n, line)
+        line = fit_line(points, raw, piece, length)
+        off, farthest = _deviation(points, piece, length, line)
         if off > deviation and 0 < farthest < length - 1:
             waiting.append((piece + farthest, length - farthest))
             waiting.append((piece, farthest + 1))
         elif line[U1] - line[U0] >= shortest:
             lines.append(line)
+    return lines
 
 
 @kernel
@@ -141,7 +145,8 @@ def _fit_all(
     lines = [np.empty(8) for _ in range(0)]
     owner = [0 for _ in range(0)]
     for i in range(len(offsets) - 1):
-        start, n = offsets[i], offsets[i + 1] - offsets[i]
+        start, end = offsets[i], offsets[i + 1]
+        n = end - start
         ends = corners[corner_offsets[i] : corner_offsets[i + 1]]
         pieces = len(ends) + 1
         if closed:
@@ -154,9 +159,8 @@ def _fit_all(
                 first = ends[j - 1] if j > 0 else 0
                 last = ends[j] if j < len(ends) else n - 1
                 count = last - first + 1
-            before = len(lines)
-            _fit_pieces(points, raw, first, count, start, n, shortest, deviation, lines)
-            for _ in range(len(lines) - before):
+            for line in _fit_pieces(points[start:end], raw[start:end], first, count, shortest, deviation):
+                lines.append(line)
                 owner.append(i)
     packed = np.empty((len(lines), 8))
     for k in range(len(lines)):
@@ -224,7 +228,7 @@ def inside_first(lines: Boxes, black: NDArray[np.uint8], *, reach: float, outset
 
 
 def beyond_coverage(lines: Boxes, coverage: NDArray[np.uint8], reach: float) -> NDArray[np.bool_]:
-    """Tell which lines have nothing measured on their outer side: the border of the points or of the image."""
+    """Return which lines have no measurements on their outer side: the border of the points or of the image."""
     rows, columns = coverage.shape
     x = np.floor(lines[:, OX] + reach * lines[:, UY]).astype(np.intp)
     y = np.floor(lines[:, OY] - reach * lines[:, UX]).astype(np.intp)

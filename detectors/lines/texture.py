@@ -21,16 +21,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from ...scenes.geodata.raster import Grid
 from .boxes import U0, U1, V0, V1, Boxes, box_corners, lengths, to_box, widths
 from .contours import SAMPLE, Curves
 from .image_edges import ImageEdges
 
-__all__ = ["BIN_COUNT", "Texture", "apply_tests", "histograms_of"]
+__all__ = ["BIN_COUNT", "Texture", "TextureRules", "apply_tests", "histograms_of", "texture_of"]
 
 #: Bins of 5 degrees in 180, the outer two merged.
 BIN_COUNT = 35
@@ -57,6 +59,57 @@ class Texture:
     collective: NDArray[np.float64]
     strongest: NDArray[np.float64]
     passed: NDArray[np.bool_]
+
+
+class TextureRules(NamedTuple):
+    """Limits of the six tests.
+
+    Attributes
+    ----------
+    margin : float
+        How far outside a candidate an edge still belongs to it, metres. A final rectangle may end a strip inside the
+        edge of its roof, where the image has its strongest edge.
+    least : float
+        L_min, metres.
+    most_edges : float
+        Largest total length of edges of T2 and T5, metres.
+    area_per_edge : float
+        Least area per length of edges of T6, metres.
+    peak_ratio : float
+        Least ratio of a peak of T1 and T3 to the mean bin.
+    """
+
+    margin: float
+    least: float
+    most_edges: float
+    area_per_edge: float
+    peak_ratio: float
+
+
+class _EdgePoints(NamedTuple):
+    """Edge points sorted into the square cells of a coarse grid.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        x and y, pixels.
+    bins, owner : ndarray of int64, shape (n,)
+        Histogram bin and edge of each point.
+    order : ndarray of int64, shape (n,)
+        Points ordered by cell.
+    start : ndarray of int64, shape (cells + 1,)
+        Where each cell begins in `order`, row by row.
+    rows, columns : int
+        Of the coarse grid.
+    """
+
+    points: NDArray[np.float64]
+    bins: NDArray[np.int64]
+    owner: NDArray[np.int64]
+    order: NDArray[np.int64]
+    start: NDArray[np.int64]
+    rows: int
+    columns: int
 
 
 @kernel
@@ -95,17 +148,14 @@ def _sort_into_cells(
 
 @kernel
 def _histograms(
-    boxes: NDArray[np.float64],
-    bounds: NDArray[np.float64],
-    points: NDArray[np.float64],
-    bins: NDArray[np.int64],
-    owner: NDArray[np.int64],
-    order: NDArray[np.int64],
-    start: NDArray[np.int64],
-    rows: int,
-    columns: int,
+    boxes: NDArray[np.float64], bounds: NDArray[np.float64], edges: _EdgePoints
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Count the points in each box by bin, and the most points of one edge in one bin."""
+    """Return the number of points in each box by bin, and the largest number of points of one edge in one bin.
+
+    `bounds` are the xmin, ymin, xmax, ymax of the boxes, shape (k, 4).
+    """
+    points, bins, owner = edges.points, edges.bins, edges.owner
+    rows, columns = edges.rows, edges.columns
     collective = np.zeros((len(boxes), BIN_COUNT), dtype=np.int64)
     strongest = np.zeros(len(boxes), dtype=np.int64)
     for i in range(len(boxes)):
@@ -116,7 +166,7 @@ def _histograms(
         for row in range(row0, row1 + 1):
             for column in range(column0, column1 + 1):
                 cell = row * columns + column
-                for k in order[start[cell] : start[cell + 1]]:
+                for k in edges.order[edges.start[cell] : edges.start[cell + 1]]:
                     u, v = to_box(points[k, 0], points[k, 1], box)
                     if box[U0] <= u < box[U1] and box[V0] <= v < box[V1]:
                         collective[i, bins[k]] += 1
@@ -145,7 +195,7 @@ def histograms_of(
     bins = _orientation_bins(points, curves.offsets)
     owner = np.repeat(np.arange(len(curves)), np.diff(curves.offsets))
     order, start = _sort_into_cells(points, rows, columns)
-    collective, strongest = _histograms(boxes, bounds, points, bins, owner, order, start, rows, columns)
+    collective, strongest = _histograms(boxes, bounds, _EdgePoints(points, bins, owner, order, start, rows, columns))
     return collective * SAMPLE, strongest * SAMPLE
 
 
@@ -168,11 +218,7 @@ def apply_tests(
     collective: NDArray[np.float64],
     strongest: NDArray[np.float64],
     areas: NDArray[np.float64],
-    *,
-    least: float,
-    most_edges: float,
-    area_per_edge: float,
-    peak_ratio: float,
+    rules: TextureRules,
 ) -> NDArray[np.bool_]:
     """Return which of the tests T1 to T6 each candidate passes, shape (k, 6).
 
@@ -184,21 +230,17 @@ def apply_tests(
         Highest bin of any H_ind, metres.
     areas : ndarray, shape (k,)
         Of the candidates, square metres.
-    least, most_edges : float
-        L_min and the most length of edges of T2 and T5, metres.
-    area_per_edge : float
-        Of T6, metres.
-    peak_ratio : float
-        How many times as high as the mean bin a peak of T1 and T3 is.
+    rules : TextureRules
     """
+    least, most_edges = rules.least, rules.most_edges
     total, highest, mean = collective.sum(axis=1), collective.max(axis=1, initial=0.0), collective.mean(axis=1)
     passed = np.zeros((len(collective), 6), dtype=np.bool_)
     passed[:, 1] = (highest >= 3 * least) & (total <= most_edges)
     passed[:, 3] = (highest >= least) & (highest >= 4 * mean)
     passed[:, 4] = (strongest >= least) & (total <= most_edges)
-    passed[:, 5] = areas >= area_per_edge * total
+    passed[:, 5] = areas >= rules.area_per_edge * total
     for i in np.flatnonzero(highest >= 2 * least):
-        peaks = find_peaks(collective[i], peak_ratio)
+        peaks = find_peaks(collective[i], rules.peak_ratio)
         heights = collective[i, peaks]
         passed[i, 2] = (heights >= 2 * least).sum() >= 2 and highest[i] >= 3 * mean[i]
         high = peaks[heights >= 3 * least]
@@ -208,33 +250,9 @@ def apply_tests(
     return passed
 
 
-def judge(
-    boxes: Boxes,
-    edges: ImageEdges,
-    shape: tuple[int, int],
-    gsd: float,
-    *,
-    margin: float,
-    least: float,
-    most_edges: float,
-    area_per_edge: float,
-    peak_ratio: float,
-) -> Texture:
-    """Return the histograms and tests of candidate rectangles; see `apply_tests` for the limits.
-
-    Edges up to `margin` metres outside a rectangle count as its own: a final rectangle ends up to a strip inside the
-    edge of its roof, where the image has its strongest edge.
-    """
-    wide = boxes + np.array([0, 0, 0, 0, -1, 1, -1, 1]) * margin / gsd
-    collective, strongest = histograms_of(wide, edges.curves, edges.points, shape)
-    areas = lengths(wide) * widths(wide) * gsd**2
-    passed = apply_tests(
-        collective,
-        strongest,
-        areas,
-        least=least,
-        most_edges=most_edges,
-        area_per_edge=area_per_edge,
-        peak_ratio=peak_ratio,
-    )
-    return Texture(edges, collective, strongest, passed)
+def texture_of(boxes: Boxes, edges: ImageEdges, grid: Grid, rules: TextureRules) -> Texture:
+    """Return the histograms and tests of candidate rectangles on the grid of the image."""
+    wide = boxes + np.array([0, 0, 0, 0, -1, 1, -1, 1]) * rules.margin / grid.gsd
+    collective, strongest = histograms_of(wide, edges.curves, edges.points, grid.shape)
+    areas = lengths(wide) * widths(wide) * grid.gsd**2
+    return Texture(edges, collective, strongest, apply_tests(collective, strongest, areas, rules))

@@ -1,6 +1,6 @@
-"""The trace of one detection: every intermediate result, to count, to draw and to test.
+"""The trace of one detection: every intermediate result, to count, to show and to test.
 
-The *fate* of a line says why it made no rectangle of its own, or that it did.
+The *outcome* of a line says why it made no rectangle, or that it did.
 """
 
 from __future__ import annotations
@@ -17,11 +17,14 @@ from .boxes import Boxes
 from .masks import Masks
 from .texture import Texture
 
-__all__ = ["Fate", "Trace"]
+__all__ = ["Adjusted", "Outcome", "Trace", "Votes"]
+
+#: Votes v1 to v4 of each line (see `voting`), shape (n, 4), NaN without a vote.
+Votes = NDArray[np.float64]
 
 
-class Fate(IntEnum):
-    """What became of a line; `label` is its name for people."""
+class Outcome(IntEnum):
+    """Why a line made no rectangle, or that it did; `label` says it in words."""
 
     RECTANGLE = 0, "made a rectangle"
     BORDER = 1, "on the border of the points or the image"
@@ -33,12 +36,33 @@ class Fate(IntEnum):
 
     label: str
 
-    def __new__(cls, value: int, label: str) -> Fate:
+    def __new__(cls, value: int, label: str) -> Outcome:
         """Make a member with its label."""
         member = int.__new__(cls, value)
         member._value_ = value
         member.label = label
         return member
+
+
+@dataclass(frozen=True, eq=False)
+class Adjusted:
+    """Lines after adjustment and extension.
+
+    Attributes
+    ----------
+    lines : ndarray, shape (n, 8)
+    shapes : ndarray of int64, shape (n,)
+        Black shape of each line.
+    rotation : ndarray, shape (n,)
+        Angle by which each was adjusted, radians; NaN for lines that were not.
+    remaining : ndarray of bool, shape (n,)
+        Lines that no earlier step dropped.
+    """
+
+    lines: Boxes
+    shapes: NDArray[np.int64]
+    rotation: NDArray[np.float64]
+    remaining: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,22 +77,21 @@ class Trace:
         Row prefix sums of the vegetation index.
     fitted, lines : ndarray, shape (n, 8)
         Lines as fitted, and adjusted and extended (as far as they came).
-    shapes, fates : ndarray of int64, shape (n,)
-        Black shape of each line, and its `Fate`.
-    rescued : ndarray of bool, shape (n,)
-        Lines that the vegetation index alone would have dropped and the entropy kept.
+    shapes, outcomes : ndarray of int64, shape (n,)
+        Black shape of each line, and its `Outcome`.
+    smooth_green : ndarray of bool, shape (n,)
+        Lines that the vegetation index alone would have dropped, kept because their entropy is low.
     initial : ndarray, shape (m, 8)
         Initial rectangles.
-    initial_fates : ndarray of int64, shape (m,)
-        Index of each one's candidate, or -1 when it lay inside one.
+    candidate_of : ndarray of int64, shape (m,)
+        Index of the candidate of each initial rectangle, -1 when it lay inside one.
     candidates : ndarray, shape (k, 8)
         Extended rectangles.
     duplicates : ndarray of bool, shape (k,)
-        Candidates with the texture of a building that larger ones cover already.
+        Candidates with the texture of a building that larger ones cover.
     kept : ndarray of bool, shape (k,)
-        Which candidates are buildings, each seen once.
+        Which candidates are buildings and no duplicates.
     votes : ndarray, shape (n, 4), optional
-        Votes v1 to v4 of each line, NaN without a vote.
     texture : Texture, optional
         Edge orientation histograms and tests of the candidates.
     """
@@ -79,14 +102,14 @@ class Trace:
     fitted: Boxes
     lines: Boxes
     shapes: NDArray[np.int64]
-    fates: NDArray[np.int64]
-    rescued: NDArray[np.bool_]
+    outcomes: NDArray[np.int64]
+    smooth_green: NDArray[np.bool_]
     initial: Boxes
-    initial_fates: NDArray[np.int64]
+    candidate_of: NDArray[np.int64]
     candidates: Boxes
     duplicates: NDArray[np.bool_]
     kept: NDArray[np.bool_]
-    votes: NDArray[np.float64] | None = None
+    votes: Votes | None = None
     texture: Texture | None = None
 
     @property
@@ -96,16 +119,16 @@ class Trace:
 
     @property
     def final(self) -> Boxes:
-        """The rectangles that are buildings."""
+        """The candidates that are buildings."""
         return np.asarray(self.candidates[self.kept])
 
     def counts(self) -> dict[str, Any]:
         """Return how many lines and rectangles each step left, for the metadata of the footprints."""
-        counted: dict[str, Any] = {"lines": len(self.fates)}
-        counted |= {f"lines {fate.label}": int((self.fates == fate).sum()) for fate in Fate}
-        counted["lines kept by entropy"] = int(self.rescued.sum())
+        counted: dict[str, Any] = {"lines": len(self.outcomes)}
+        counted |= {f"lines {outcome.label}": int((self.outcomes == outcome).sum()) for outcome in Outcome}
+        counted["lines kept by entropy"] = int(self.smooth_green.sum())
         counted["initial rectangles"] = len(self.initial)
-        counted["initial rectangles inside a final one"] = int((self.initial_fates < 0).sum())
+        counted["initial rectangles inside a final one"] = int((self.candidate_of < 0).sum())
         counted["final rectangles that larger ones cover"] = int(self.duplicates.sum())
         counted["final rectangles"] = int(self.kept.sum())
         if self.texture is not None:

@@ -173,12 +173,23 @@ def _share(part: _Floats, whole: _Floats) -> _Floats:
 
 
 @kernel
-def _moments(x, y, z, index, chosen, middle, base, shape):  # type: ignore[no-untyped-def]
-    """Return n, x, y, z, xx, xy, yy, xz, yz, zz of the chosen points in their cells `index`, from a middle and base."""
+def _moments(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    z: NDArray[np.float64],
+    index: NDArray[np.intp],
+    chosen: NDArray[np.intp],
+    origin: tuple[float, float, float],
+    shape: tuple[int, int],
+) -> NDArray[np.float64]:
+    """Return the sums of 1, x, y, z, xx, xy, yy, xz, yz, zz of the chosen points in each cell, shape (10, *shape).
+
+    `index` is the cell of each chosen point; coordinates are relative to an origin.
+    """
     sums = np.zeros((10, shape[0] * shape[1]))
     for position in range(len(chosen)):
         i, cell = chosen[position], index[position]
-        dx, dy, dz = x[i] - middle[0], y[i] - middle[1], z[i] - base
+        dx, dy, dz = x[i] - origin[0], y[i] - origin[1], z[i] - origin[2]
         sums[0, cell] += 1
         sums[1, cell] += dx
         sums[2, cell] += dy
@@ -205,8 +216,8 @@ def _smoothest_plane(
     after = width - 1 - before
     window = np.ones((width, width), np.uint8)
     smoothest = np.empty(grid.shape, dtype=np.float32)
-    middle = np.array(grid.to_world(grid.rows / 2, grid.columns / 2))
-    base = float(points.z[chosen].mean()) if len(chosen) else 0.0
+    x, y = grid.to_world(grid.rows / 2, grid.columns / 2)
+    origin = float(x), float(y), float(points.z[chosen].mean()) if len(chosen) else 0.0
     row = index[chosen] // grid.columns
     strip = max(4 * width, _STRIP // grid.columns)
     for top in range(0, grid.rows, strip):
@@ -214,7 +225,7 @@ def _smoothest_plane(
         first, last = max(top - width + 1, 0), min(top + strip + width - 1, grid.rows)
         here = chosen[(row >= first) & (row < last)]
         shape = (last - first, grid.columns)
-        moments = _moments(points.x, points.y, points.z, index[here] - first * grid.columns, here, middle, base, shape)
+        moments = _moments(points.x, points.y, points.z, index[here] - first * grid.columns, here, origin, shape)
         for moment in moments:
             cv2.boxFilter(
                 moment, -1, (width, width), moment, (before, before), normalize=False, borderType=cv2.BORDER_CONSTANT
@@ -225,7 +236,7 @@ def _smoothest_plane(
 
 
 @kernel
-def _plane_deviation(moments):  # type: ignore[no-untyped-def]
+def _plane_deviation(moments: NDArray[np.float64]) -> NDArray[np.float32]:
     """Return the standard deviation about the least-squares plane, `_NO_PLANE` where the points determine none."""
     _, rows, columns = moments.shape
     deviation = np.full((rows, columns), _NO_PLANE, dtype=np.float32)

@@ -32,7 +32,7 @@ STAGES = {
     "votes": ("longest_image_lines", "cast_votes"),
     "initial rectangles": ("initial_rectangles",),
     "final rectangles, duplicates": ("final_rectangles", "find_duplicates"),
-    "orientation histograms": ("judge",),
+    "orientation histograms": ("texture_of",),
 }  # fmt: skip
 
 

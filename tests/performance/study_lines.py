@@ -206,7 +206,7 @@ def loss_of(reference, trace, lines, detected):
     """Return the step that lost one reference, from what lies in it."""
     import shapely
 
-    from roofbench.detectors.lines.trace import Fate
+    from roofbench.detectors.lines.trace import Outcome
 
     if reference.intersection(detected).area > 0.4 * reference.area:
         return "covered by another part"
@@ -216,17 +216,17 @@ def loss_of(reference, trace, lines, detected):
     cells, on = trace.grid.cells(x[inside], y[inside])
     if not (trace.masks.primary.ravel()[cells] & on).mean() >= 0.5:
         return "mask: less than half black"
-    fates = trace.fates[shapely.distance(lines, reference.exterior) < 1.2]
-    if not len(fates):
+    outcomes = trace.outcomes[shapely.distance(lines, reference.exterior) < 1.2]
+    if not len(outcomes):
         return "no line of 3 m"
-    if (fates == Fate.RECTANGLE).any():
+    if (outcomes == Outcome.RECTANGLE).any():
         from roofbench.detectors.lines.boxes import box_corners
 
         corners = box_corners(trace.candidates[~trace.kept & ~trace.duplicates])
         lost = shapely.polygons(np.stack(trace.grid.to_world(corners[..., 1], corners[..., 0]), axis=-1))
         covers = shapely.area(shapely.intersection(lost, reference)) > 0.4 * reference.area
         return "texture" if covers.any() else "rectangle elsewhere"
-    return "lines: " + Fate(int(np.bincount(fates).argmax())).label
+    return "lines: " + Outcome(int(np.bincount(outcomes).argmax())).label
 
 
 def losses(seeds):

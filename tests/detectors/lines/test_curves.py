@@ -119,7 +119,7 @@ def test_a_line_fitted_to_noisy_points_is_their_total_least_squares_line():
     rng = np.random.default_rng(2)
     t = np.sort(rng.uniform(-30, 30, 80))
     points = np.stack([40 + 0.6 * t, 50 + 0.8 * t], axis=-1) + rng.normal(0, 0.3, (80, 2))
-    line = fit_line(points, points, 0, 80, 0, 80)
+    line = fit_line(points, points, 0, 80)
     centred = points - points.mean(axis=0)
     axis = np.linalg.svd(centred)[2][0]
     assert abs(line[UX] * axis[1] - line[UY] * axis[0]) < 1e-9

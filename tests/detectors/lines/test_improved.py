@@ -6,7 +6,7 @@ import shapely
 from builders.line_scenes import GREEN_ROOF, LEAVES, SceneBuilder, corners_off, rectangle
 
 from roofbench.detectors.lines.improved import Improved
-from roofbench.detectors.lines.trace import Fate
+from roofbench.detectors.lines.trace import Outcome
 from roofbench.detectors.registry import make_detector
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.scene import Scene
@@ -66,7 +66,7 @@ def test_votes_and_tests_are_optional_and_their_absence_computes_neither():
 def test_a_line_with_a_poor_vote_is_dropped_with_that_reason():
     scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 20)).build().for_detection()
     trace = Improved(majority=1.0).trace(scene)
-    assert (trace.fates == Fate.OUTVOTED).all()
+    assert (trace.outcomes == Outcome.OUTVOTED).all()
     assert len(trace.final) == 0
 
 

@@ -9,7 +9,13 @@ from roofbench.detectors.lines.boxes import U0, U1, UX, UY, V0, V1, prefix_sums
 from roofbench.detectors.lines.colours import Colours, dominant_bins, dominant_ranges, yiq_bins
 from roofbench.detectors.lines.duplicates import find_duplicates, new_share
 from roofbench.detectors.lines.extension import Cover, Growth, extend_lines, extend_rectangle
-from roofbench.detectors.lines.final_rectangles import FinalRules, extend_final_side, lies_inside, shrink, strip_shares
+from roofbench.detectors.lines.final_rectangles import (
+    FinalRules,
+    extended_final_side,
+    lies_inside,
+    shrink,
+    strip_shares,
+)
 from roofbench.detectors.lines.initial_rectangles import INSIDE, TOO_NARROW, initial_rectangles, share_inside
 
 NONE = np.zeros((0, 1), dtype=np.int32)
@@ -88,8 +94,8 @@ def test_a_side_stops_at_a_court_that_takes_less_than_a_third_of_it():
     box = line(70, 20, 0, 100)
     box[V1] = 10.0
     in_parts, as_a_whole = box.copy(), box.copy()
-    extend_rectangle(cover(black), RULES, in_parts)
-    extend_rectangle(cover(black), RULES._replace(part=1e6), as_a_whole)
+    in_parts = extend_rectangle(cover(black), RULES, in_parts)
+    as_a_whole = extend_rectangle(cover(black), RULES._replace(part=1e6), as_a_whole)
     assert 20 + in_parts[V1] == pytest.approx(60, abs=2.7)
     assert 20 + as_a_whole[V1] == pytest.approx(100, abs=2.7)
 
@@ -117,7 +123,7 @@ def test_a_rectangle_grows_over_the_whole_black_shape():
     black[20:80, 30:170] = 1
     box = line(100, 20, 0, 40)
     box[V1] = 10
-    extend_rectangle(cover(black), RULES, box)
+    box = extend_rectangle(cover(black), RULES, box)
     assert (box[V0], box[V1]) == (0, pytest.approx(60, abs=2.7))
     assert box[U1] - box[U0] == pytest.approx(140, abs=5.4)
 
@@ -127,9 +133,9 @@ def test_the_longest_line_makes_the_rectangle_and_the_others_are_inside_it():
     black[20:80, 30:170] = 1
     lines = np.array([line(100, 20, 0, 130), line(100, 80, 180, 120), line(170, 50, 90, 50), line(100, 10, 180, 30)])
     order = np.arange(4)
-    found, fate = initial_rectangles(cover(black), RULES, lines, order, 10.0, 20.0, 3.0, 0.75)
+    found, made = initial_rectangles(cover(black), RULES, lines, order, 10.0, 20.0, 3.0, 0.75)
     assert len(found) == 1
-    assert fate.tolist() == [0, INSIDE, INSIDE, TOO_NARROW]
+    assert made.tolist() == [0, INSIDE, INSIDE, TOO_NARROW]
 
 
 def test_a_line_is_inside_by_half_its_length_and_its_midpoint():
@@ -229,7 +235,7 @@ def test_a_side_is_extended_as_far_as_the_colour_of_the_roof_reaches():
     box = np.array([30.0, 30.0, 1.0, 0.0, -10.0, 10.0, -10.0, 10.0])
     within = dominant_ranges(colours, box, 0.97, 0.9)
     rules = FinalRules(0.15, 0.97, 0.9, 2.3, 1.0, 0.4, 0.9, 0.1, 0.0, False)
-    extend_final_side(colours, black, black, within, rules, box, U1)
+    box[U1] = extended_final_side(colours, black, black, within, rules, box, U1)
     assert 30 + box[U1] == pytest.approx(60, abs=1.5)
 
 
@@ -241,7 +247,7 @@ def test_a_side_ends_where_the_primary_mask_is_black_again_after_a_gap():
     box = np.array([30.0, 30.0, 1.0, 0.0, -10.0, 10.0, -10.0, 10.0])
     within = dominant_ranges(colours, box, 0.97, 0.9)
     rules = FinalRules(0.15, 0.97, 0.9, 2.0, 1.0, 0.4, 0.9, 0.1, 0.1, False)
-    extend_final_side(colours, primary, secondary, within, rules, box, U1)
+    box[U1] = extended_final_side(colours, primary, secondary, within, rules, box, U1)
     assert 50 <= 30 + box[U1] <= 54
 
 

@@ -109,7 +109,7 @@ def test_a_house_cut_by_the_border_of_the_points_makes_no_line_along_the_border(
     builder = SceneBuilder().house(rectangle(30, 0, 14, 12))
     found = Original().trace(builder.build().for_detection())
     assert len(found.final) == 1
-    assert {int(fate) for fate in found.fates} <= {0, 1, 5}
+    assert {int(outcome) for outcome in found.outcomes} <= {0, 1, 5}
 
 
 def test_a_scene_without_image_or_elevation_is_refused_with_the_reason():

@@ -10,7 +10,7 @@ from roofbench.detectors.lines.boxes import OX, OY, UX, UY, V0, V1, length_insid
 from roofbench.detectors.lines.contours import Curves
 from roofbench.detectors.lines.entropy import WINDOW, grey_levels, local_entropy
 from roofbench.detectors.lines.image_edges import extract_edges, link_pixels
-from roofbench.detectors.lines.texture import BIN_COUNT, apply_tests, find_peaks, histograms_of
+from roofbench.detectors.lines.texture import BIN_COUNT, TextureRules, apply_tests, find_peaks, histograms_of
 from roofbench.detectors.lines.voting import cast_votes, longest_image_lines
 from roofbench.scenes.geodata.raster import Grid, Image
 
@@ -40,7 +40,7 @@ def test_a_chain_is_linked_from_end_to_end_and_a_ring_once_around():
     edges = np.zeros((40, 40), np.uint8)
     edges[5, 3:30] = 1
     edges[20:30, 10] = edges[20:30, 19] = edges[20, 10:20] = edges[29, 10:20] = 1
-    points, offsets = link_pixels(edges.copy(), 5)
+    points, offsets = link_pixels(edges, 5)
     assert np.diff(offsets).tolist() == [27, 36]
     assert points[0].tolist() == [3.5, 5.5]
     assert (np.abs(np.diff(points[:27], axis=0)) == [1, 0]).all()
@@ -140,7 +140,7 @@ def bins(**heights):
 def passed(histogram, *, strongest=0.0, area=1.0, peak_ratio=1.0):
     found = apply_tests(
         histogram[None], np.array([strongest]), np.array([area]),
-        least=3.0, most_edges=90.0, area_per_edge=4.5, peak_ratio=peak_ratio,
+        TextureRules(margin=0.0, least=3.0, most_edges=90.0, area_per_edge=4.5, peak_ratio=peak_ratio),
     )  # fmt: skip
     return [number + 1 for number in np.flatnonzero(found[0])]
 
