@@ -20,9 +20,10 @@ from ..scenes.builtin import hamlet
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
 from .execution.isolation import IsolatedProcess, Limits
-from .execution.tasks import Outcome, Task
+from .execution.tasks import Task
 from .execution.worker import detect
 from .identity.recipes import PluginRecipe, SceneRecipe
+from .store.outcomes import Outcome
 
 __all__ = ["Check", "check_detector", "check_evaluator", "check_plugin"]
 

@@ -19,9 +19,9 @@ from .suite import DetectorEntry, Suite
 
 __all__ = [
     "KeyedEvaluator",
-    "Overwrite",
     "Plan",
     "PlannedRun",
+    "Rerun",
     "differences",
     "identity_now",
     "make_plan",
@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 #: ``missing``: what has no good result is run, failures again; ``never``: what is not stored at all; ``always``: all.
-Overwrite = Literal["missing", "never", "always"]
+Rerun = Literal["missing", "never", "always"]
 
 
 @dataclass(frozen=True)
@@ -89,11 +89,12 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class Plan:
-    """The runs of a suite, ordered by scene, and the evaluators."""
+    """The runs of a suite, ordered by scene, the evaluators, and which stored runs are repeated."""
 
     suite: Suite
     runs: tuple[PlannedRun, ...]
     evaluators: tuple[KeyedEvaluator, ...]
+    rerun: Rerun = "missing"
 
     @property
     def keys(self) -> list[str]:
@@ -118,14 +119,14 @@ def scene_recipe(scene: SceneRecipe | Scene) -> SceneRecipe:
     return SceneRecipe.of_scene(scene) if isinstance(scene, Scene) else scene
 
 
-def make_plan(suite: Suite, store: Store, *, overwrite: Overwrite = "missing", only_failed: bool = False) -> Plan:
+def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_failed: bool = False) -> Plan:
     """Compare a suite with the store.
 
     Parameters
     ----------
     suite : Suite
     store : Store
-    overwrite : {"missing", "never", "always"}
+    rerun : {"missing", "never", "always"}
     only_failed : bool
         Try failures again and leave everything else alone.
     """
@@ -161,10 +162,10 @@ def make_plan(suite: Suite, store: Store, *, overwrite: Overwrite = "missing", o
         todo: Literal["detect", "evaluate", "nothing"] = "nothing"
         if status is None:
             todo, why = "detect", _why_new(store, identity)
-        elif overwrite == "always":
+        elif rerun == "always":
             todo, why = "detect", "to be replaced"
         elif status == "failed":
-            retried = overwrite == "missing"
+            retried = rerun == "missing"
             todo = "detect" if retried else "nothing"
             why = f"failed before: {reason}" + ("" if retried else " (not tried again)")
         elif status == "skipped":
@@ -180,7 +181,7 @@ def make_plan(suite: Suite, store: Store, *, overwrite: Overwrite = "missing", o
         runs.append(
             PlannedRun(identity=identity, entry=entry, scene=scene, todo=todo, why=why, stored=run_id, lacking=lacking)
         )
-    return Plan(suite, tuple(runs), evaluators)
+    return Plan(suite, tuple(runs), evaluators, rerun)
 
 
 def _why_new(store: Store, identity: RunIdentity) -> str:

@@ -37,6 +37,7 @@ __all__ = [
     "read_suite",
     "scenes_of",
     "suite_names",
+    "suite_of_scenes",
     "suite_of_words",
 ]
 
@@ -191,15 +192,18 @@ def suite_of_words(
     elif len(words) == 1 and words[0] in suite_names():
         suite = named_suite(words[0])
     else:
-        suite = Suite("scenes", scenes_of(words), (), (make_evaluator(_DEFAULT_EVALUATOR),))
-        if not detectors:
-            suite = replace(suite, detectors=all_detectors())
+        suite = suite_of_scenes(scenes_of(words))
     if detectors:
         numbers = tuple(range(seeds))
         suite = replace(suite, detectors=tuple(DetectorEntry(make_detector(name), numbers) for name in detectors))
     if evaluators:
         suite = replace(suite, evaluators=tuple(make_evaluator(name) for name in evaluators))
     return suite
+
+
+def suite_of_scenes(scenes: Iterable[SceneRecipe | Scene], *, name: str = "scenes") -> Suite:
+    """Return a suite of these scenes with every detector that needs no parameter and the default evaluator."""
+    return Suite(name, tuple(scenes), all_detectors(), (make_evaluator(_DEFAULT_EVALUATOR),))
 
 
 def all_detectors() -> tuple[DetectorEntry, ...]:

@@ -12,8 +12,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..benchmark.execution.tasks import Outcome
     from ..benchmark.plan import Plan, PlannedRun
+    from ..benchmark.store.outcomes import Outcome
 
 __all__ = ["import_progress", "run_progress"]
 

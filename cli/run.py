@@ -91,13 +91,13 @@ def run(
         rank_index(suite.evaluators[0], index)
         if output is not None and not dry_run:
             _make_folder(output, overwrite)
-        plan = make_plan(suite, opened, overwrite=rerun, only_failed=retry_failed)
+        plan = make_plan(suite, opened, rerun=rerun, only_failed=retry_failed)
         if dry_run:
             _print_plan(plan)
             return
         opened.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
         with run_progress(plan, console, verbose=options.verbose) as report:
-            result = run_plan(plan, opened, execution=execution, overwrite=rerun, progress=report)
+            result = run_plan(plan, opened, execution=execution, progress=report)
         boards = [
             make_leaderboard(result.rows, opened, keyed, title=f"Suite {suite.name}", rank_by=index)
             for keyed in plan.evaluators

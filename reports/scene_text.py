@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tabulate import tabulate
-
+from ..core.parameters import parameter_text
 from ..scenes import builtin
 from ..scenes.synthetic import SceneParameters, preset_names
 from ..scenes.synthetic.presets import preset
+from .tables import Column, Table
 
 __all__ = ["format_facts", "format_parameters", "format_presets"]
 
@@ -46,10 +46,11 @@ def _printed(key: str, value: Any) -> str:
 def format_parameters() -> str:
     """Return the parameters of the generator with default, unit, range and meaning."""
     rows = [
-        (rule.name, _plain(rule.default), rule.unit, rule.range_text, rule.doc)
+        (rule.name, parameter_text(rule.default), rule.unit, rule.range_text, rule.doc)
         for rule in SceneParameters.parameters().values()
     ]
-    return tabulate(rows, ("parameter", "default", "unit", "range", "meaning"), disable_numparse=True)
+    titles = ("parameter", "default", "unit", "range", "meaning")
+    return Table.of((Column(title, "left") for title in titles), rows).to_text()
 
 
 def format_presets() -> str:
@@ -66,8 +67,5 @@ def format_presets() -> str:
         rows.append(
             (name, extent, f"{recipe.buildings} {recipe.counted}", image, f"{recipe.pulse} {recipe.point_spacing:g} m")
         )
-    return tabulate(rows, ("preset", "extent", "reference", "image", "pulses, spacing"), disable_numparse=True)
-
-
-def _plain(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    titles = ("preset", "extent", "reference", "image", "pulses, spacing")
+    return Table.of((Column(title, "left") for title in titles), rows).to_text()

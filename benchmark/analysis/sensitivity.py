@@ -116,7 +116,11 @@ def _lines_of(
         mine = table[table["index"] == index.key]
         points = tuple(
             SensitivityPoint(
-                _plain(row[axis]), _number(row["mean"]), _number(row["low"]), _number(row["high"]), int(row["scenes"])
+                _axis_value(row[axis]),
+                _number(row["mean"]),
+                _number(row["low"]),
+                _number(row["high"]),
+                int(row["scenes"]),
             )
             for row in mine.to_dict("records")
         )
@@ -127,7 +131,8 @@ def _lines_of(
     return lines
 
 
-def _plain(value: Any) -> Any:
+def _axis_value(value: Any) -> Any:
+    """Return a value of a column as the sweep wrote it: pandas turns whole numbers beside gaps into floats."""
     value = value.item() if hasattr(value, "item") else value
     return int(value) if isinstance(value, float) and value.is_integer() else value
 

@@ -26,9 +26,9 @@ from ...detectors.base import Detector
 from ...evaluators.base import Index
 from ...scenes.scene import Scene
 from ..execution.runner import Execution, run_plan
-from ..execution.tasks import Outcome
 from ..identity.recipes import SceneRecipe
-from ..plan import KeyedEvaluator, Overwrite, Plan, PlannedRun, make_plan
+from ..plan import KeyedEvaluator, Plan, PlannedRun, Rerun, make_plan
+from ..store.outcomes import Outcome
 from ..store.records import RunRow
 from ..store.writer import Store
 from ..suite import DetectorEntry, Suite
@@ -149,7 +149,7 @@ def _range(word: str, text: str) -> list[Any]:
 
 
 def make_sweep(
-    suite: Suite, axes: Sequence[Axis], store: Store, *, grid: bool = False, overwrite: Overwrite = "missing"
+    suite: Suite, axes: Sequence[Axis], store: Store, *, grid: bool = False, rerun: Rerun = "missing"
 ) -> Sweep:
     """Plan a sweep of the suite's detectors over its scenes.
 
@@ -161,7 +161,7 @@ def make_sweep(
     store : Store
     grid : bool
         Vary all axes together.
-    overwrite : {"missing", "never", "always"}
+    rerun : {"missing", "never", "always"}
 
     Raises
     ------
@@ -177,12 +177,12 @@ def make_sweep(
                 continue  # another detector's axis
             detector = type(entry.detector).build({**entry.detector.values(), **own})
             part = replace(suite, scenes=_scenes(suite, point), detectors=(DetectorEntry(detector, entry.seeds),))
-            points.append((point, entry.detector, make_plan(part, store, overwrite=overwrite)))
+            points.append((point, entry.detector, make_plan(part, store, rerun=rerun)))
     runs = {run.identity.key: run for _, _, plan in points for run in plan.runs}
     ordered = sorted(runs.values(), key=lambda run: run.identity.scene.name)  # workers keep the scene they have open
     evaluators = points[0][2].evaluators
     detectors = tuple(entry.detector for entry in suite.detectors)
-    return Sweep(tuple(axes), detectors, tuple(points), Plan(suite, tuple(ordered), evaluators))
+    return Sweep(tuple(axes), detectors, tuple(points), Plan(suite, tuple(ordered), evaluators, rerun))
 
 
 def _check_axes(suite: Suite, axes: Sequence[Axis]) -> None:
@@ -230,7 +230,6 @@ def run_sweep(
     store: Store,
     *,
     execution: Execution | None = None,
-    overwrite: Overwrite = "missing",
     progress: Callable[[PlannedRun, Outcome], None] | None = None,
 ) -> tuple[pd.DataFrame, tuple[RunRow, ...]]:
     """Run what is missing; return the tidy table and every run of the sweep.
@@ -243,7 +242,7 @@ def run_sweep(
         interval over scenes), ``scenes`` (where it is defined), ``runs``, ``failed``, ``skipped``.
     rows : tuple of RunRow
     """
-    result = run_plan(sweep.plan, store, execution=execution, overwrite=overwrite, progress=progress)
+    result = run_plan(sweep.plan, store, execution=execution, progress=progress)
     return sweep_table(sweep, store, {row.key: row for row in result.rows}), result.rows
 
 

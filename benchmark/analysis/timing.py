@@ -23,7 +23,8 @@ from ...core.errors import UnsupportedError
 from ...core.package import FOLDER, NAME
 from ...evaluators.base import Index
 from ..execution.isolation import IsolatedProcess, Limits
-from ..execution.tasks import Outcome, Task
+from ..execution.tasks import Task
+from ..store.outcomes import Outcome
 from .baseline import Baseline
 from .inference import LEVEL, bootstrap_interval, lowest_p, scenes_needed, sign_flip_p
 from .results import Conclusion, IndexConclusion

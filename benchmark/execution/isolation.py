@@ -22,8 +22,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import IO
 
+from ..store.outcomes import Cost, Outcome
 from .memory import bound_allocations, highest_memory
-from .tasks import Cost, Outcome
 
 __all__ = [
     "THREAD_LIMITS",

@@ -14,13 +14,14 @@ from ...scenes.scene import Scene
 from ..identity.provenance import code_version
 from ..identity.recipes import PluginRecipe, SceneRecipe
 from ..identity.spool import spool
-from ..plan import KeyedEvaluator, Overwrite, Plan, PlannedRun, scene_recipe
+from ..plan import KeyedEvaluator, Plan, PlannedRun, scene_recipe
+from ..store.outcomes import Outcome, Score
 from ..store.records import RunRow
 from ..store.writer import Store
 from .dispatch import Dispatcher
 from .executors import InProcess, Slot, cluster_slot, local_slots
 from .isolation import Limits, call_isolated
-from .tasks import Outcome, Score, Task
+from .tasks import Task
 from .worker import execute
 
 __all__ = ["Execution", "RunResult", "run_plan", "score_stored"]
@@ -84,7 +85,6 @@ def run_plan(
     store: Store,
     *,
     execution: Execution | None = None,
-    overwrite: Overwrite = "missing",
     progress: Callable[[PlannedRun, Outcome], None] | None = None,
 ) -> RunResult:
     """Do what is to be done and return what is stored.
@@ -95,8 +95,6 @@ def run_plan(
     store : Store
     execution : Execution, optional
         One worker process by default.
-    overwrite : {"missing", "never", "always"}
-        As the plan was made.
     progress : callable, optional
         Told every finished run with its outcome.
     """
@@ -110,8 +108,8 @@ def run_plan(
             evaluated += 1
     waiting = [run for run in plan.runs if run.todo == "detect"]
     done = 0
-    for run, outcome in _outcomes(waiting, plan, store, execution, overwrite):
-        store.record(run.identity, outcome, version=version, replace=overwrite == "always")
+    for run, outcome in _outcomes(waiting, plan, store, execution):
+        store.record(run.identity, outcome, version=version, replace=plan.rerun == "always")
         done += 1
         if progress is not None:
             progress(run, outcome)
@@ -136,7 +134,7 @@ def score_stored(store: Store, run_id: int, evaluators: tuple[KeyedEvaluator, ..
 
 
 def _outcomes(
-    runs: list[PlannedRun], plan: Plan, store: Store, execution: Execution, overwrite: Overwrite
+    runs: list[PlannedRun], plan: Plan, store: Store, execution: Execution
 ) -> Iterator[tuple[PlannedRun, Outcome]]:
     """Yield outcomes as they come in; a run that another process stored meanwhile is left out."""
     if not runs:
@@ -152,7 +150,7 @@ def _outcomes(
         free = [slot for turn in range(max(slot.capacity for slot in slots)) for slot in slots if turn < slot.capacity]
         while True:
             while free and (run := dispatcher.next_for(free[0])) is not None:
-                if overwrite != "always" and _is_stored(store, run):
+                if plan.rerun != "always" and _is_stored(store, run):
                     continue
                 task = Task(
                     scene=scenes.recipe(run.scene),
@@ -220,7 +218,7 @@ class _Scenes:
         if id(scene) not in self._spooled:
             if self._folder is None:
                 self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="roofbench-")))
-            self._spooled[id(scene)] = spool(scene, self._folder)
+            self._spooled[id(scene)] = SceneRecipe.of_scene(scene, spooled=spool(scene, self._folder))
         return replace(self._spooled[id(scene)], name=scene.name)
 
 

@@ -24,9 +24,10 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.scene import Scene
 from ..identity.keys import random_stream_entropy
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
+from ..store.outcomes import Cost, Outcome, SceneRecord, Score, plain_value
 from .memory import highest_memory, reset_highest_memory
 from .scene_picture import scene_picture
-from .tasks import Cost, Outcome, SceneRecord, Score, Task, _plain
+from .tasks import Task
 
 __all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream"]
 
@@ -104,7 +105,7 @@ def execute(
         status="ok",
         cost=cost,
         detections=tuple(shapely.to_wkb(detected.polygons).tolist()),
-        attributes={name: [_plain(value) for value in column] for name, column in detected.attributes.items()},
+        attributes={name: [plain_value(value) for value in column] for name, column in detected.attributes.items()},
         metadata={**detected.metadata, **({"repairs": [str(r) for r in detected.repairs]} if detected.repairs else {})},
         scores=tuple(scores),
         scene=record,
@@ -135,7 +136,7 @@ def describe(scene: Scene) -> SceneRecord:
         area=None if scene.area is None else shapely.to_wkb(scene.area),
         reference=None if reference is None else tuple(shapely.to_wkb(reference.polygons).tolist()),
         reference_ids=() if reference is None else tuple(reference.ids.tolist()),
-        building_ids=None if labels is None else tuple(_plain(label) for label in labels),
+        building_ids=None if labels is None else tuple(plain_value(label) for label in labels),
         facts={name: value for name, value in scene.facts.items() if _is_json(value)},
         point_count=None if scene.points is None else len(scene.points),
         picture=None if picture is None else picture.content,

@@ -27,6 +27,7 @@ from ...scenes.synthetic import make_scene
 from ...scenes.synthetic.presets import preset
 from ...scenes.synthetic.presets import preset_names as generator_presets
 from .keys import digest, module_closure, source_closure
+from .spool import read_spooled
 
 __all__ = ["PluginRecipe", "SceneRecipe", "code_digest", "label_of", "preset_names"]
 
@@ -139,9 +140,10 @@ class SceneRecipe:
         return cls("builtin" if name == _HAMLET else "preset", full_name, name, seed, values)
 
     @classmethod
-    def of_scene(cls, scene: Scene) -> Self:
-        """Return the recipe of a scene object, which stays where it is: see `benchmark.spool` for other processes."""
-        return cls("memory", scene.name, "", content_hash=scene.content_hash)
+    def of_scene(cls, scene: Scene, *, spooled: Path | None = None) -> Self:
+        """Return the recipe of a scene object: it stays in this process, or other processes read the spooled file."""
+        kind: Literal["spooled", "memory"] = "memory" if spooled is None else "spooled"
+        return cls(kind, scene.name, str(spooled or ""), content_hash=scene.content_hash)
 
     @property
     def word(self) -> str:
@@ -179,8 +181,6 @@ class SceneRecipe:
         if self.kind == "builtin":
             return hamlet(self.seed)
         if self.kind == "spooled":
-            from .spool import read_spooled
-
             return read_spooled(Path(self.place), name=self.name)
         if self.kind == "memory":
             raise UnsupportedError(f"scene {self.name!r} lives in the memory of another process: spool it first")

@@ -18,13 +18,12 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid, Image
 from ...scenes.scene import Scene
-from .recipes import SceneRecipe
 
 __all__ = ["read_spooled", "spool"]
 
 
-def spool(scene: Scene, folder: Path) -> SceneRecipe:
-    """Write a scene into `folder` and return the recipe that opens it."""
+def spool(scene: Scene, folder: Path) -> Path:
+    """Write a scene into `folder` and return the file."""
     file = folder / f"{scene.content_hash[:24]}.npz"
     arrays: dict[str, Any] = {}
     about: dict[str, Any] = {"extent": scene.extent, "crs": scene.crs, "content_hash": scene.content_hash}
@@ -52,7 +51,7 @@ def spool(scene: Scene, folder: Path) -> SceneRecipe:
         about["area"] = shapely.to_wkt(scene.area, rounding_precision=-1)
     with file.open("wb") as target:
         np.savez(target, about=np.array(json.dumps(about)), **arrays)
-    return SceneRecipe("spooled", scene.name, str(file), content_hash=scene.content_hash)
+    return file
 
 
 def read_spooled(file: Path, *, name: str) -> Scene:

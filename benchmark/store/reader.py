@@ -15,10 +15,10 @@ from ...evaluators.base import Evaluation, Evaluator
 from ...evaluators.verdict_table import SIDES, VerdictTable
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
-from ..execution.tasks import Status, footprints_of
 from ..identity.keys import SourceClosure
 from ..identity.recipes import PluginRecipe, SceneRecipe
 from .database import run_filter
+from .outcomes import Status, footprints_of
 from .records import RunRow, StoredScene
 
 __all__ = ["StoreReader"]

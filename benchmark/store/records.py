@@ -15,9 +15,9 @@ import shapely
 
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
-from ..execution.tasks import Status
 from ..identity.keys import SourceClosure, digest
 from ..identity.recipes import PluginRecipe, SceneRecipe
+from .outcomes import Status
 
 __all__ = ["RunIdentity", "RunRow", "StoredScene", "evaluation_key"]
 

@@ -17,10 +17,10 @@ from typing import Any, Self
 
 from ...core.errors import OutputError
 from ...evaluators.verdict_table import SIDES
-from ..execution.tasks import Outcome, SceneRecord, Score
 from ..identity.keys import SourceClosure, canonical
 from ..identity.recipes import SceneRecipe
 from .database import connect
+from .outcomes import Outcome, SceneRecord, Score
 from .reader import StoreReader
 from .records import RunIdentity, RunRow, StoredScene, evaluation_key
 

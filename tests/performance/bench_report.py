@@ -20,11 +20,11 @@ import shapely
 
 import roofbench as rb
 from roofbench.benchmark.analysis.report_contents import fill_report, newest_runs
-from roofbench.benchmark.execution.tasks import Cost, Outcome, Score
 from roofbench.benchmark.execution.worker import describe, machine_facts
 from roofbench.benchmark.identity.keys import SourceClosure
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 from roofbench.benchmark.plan import KeyedEvaluator
+from roofbench.benchmark.store.outcomes import Cost, Outcome, Score
 from roofbench.benchmark.store.records import RunIdentity
 from roofbench.benchmark.store.writer import Store
 from roofbench.reports.html_report import html_report

@@ -8,9 +8,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from roofbench.benchmark.execution.tasks import Cost, Outcome
 from roofbench.benchmark.identity.keys import SourceClosure
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
+from roofbench.benchmark.store.outcomes import Cost, Outcome
 from roofbench.benchmark.store.records import RunIdentity
 from roofbench.benchmark.store.writer import Store
 

@@ -14,10 +14,10 @@ import dataclasses
 
 import numpy as np
 import shapely
-from tabulate import tabulate
 
 import roofbench as rb
 from roofbench.detectors.ndsm.ndsm_detector import NDSM
+from roofbench.reports.tables import Column, Table
 
 CUES = {
     "all cues": {},
@@ -76,7 +76,7 @@ def quality(scene, points=None, **parameters):
 
 def cue_table(scenes):
     rows = [[name, *(quality(scene, **values) for scene in scenes)] for name, values in CUES.items()]
-    return tabulate(rows, ["variant", *(scene.name for scene in scenes)], tablefmt="github")
+    return Table.of(map(Column, ["variant", *(scene.name for scene in scenes)]), rows).to_markdown()
 
 
 def parameter_table(scenes):
@@ -86,7 +86,7 @@ def parameter_table(scenes):
         for scene in scenes:
             cells = [f"{value:g}: {quality(scene, **{name: value})}" for value in values]
             rows.append([f"`{name}`", "automatic" if default is None else f"{default:g}", scene.name, *cells])
-    return tabulate(rows, ["parameter", "default", "scene", "", "", "", ""], tablefmt="github")
+    return Table.of(map(Column, ["parameter", "default", "scene", "", "", "", ""]), rows).to_markdown()
 
 
 def point_variants(points):
@@ -129,7 +129,7 @@ def point_table(scenes):
     heads = []
     for scene in scenes:
         heads += [scene.name] if scene.image is None else [f"{scene.name}, with image", f"{scene.name}, without"]
-    return tabulate(rows, ["points", *heads], tablefmt="github")
+    return Table.of(map(Column, ["points", *heads]), rows).to_markdown()
 
 
 TABLES = {"cues": cue_table, "parameters": parameter_table, "points": point_table}

@@ -24,7 +24,7 @@ def board(path_of_plugin, tmp_path_factory):
         ],
         seeds=2,
         store=store,
-        rank_by="pixel.quality",
+        index="pixel.quality",
     )
 
 
@@ -80,4 +80,4 @@ def test_csv_holds_fractions_and_over_how_many_scenes_they_are(board):
 
 def test_ranking_by_an_unknown_index_names_the_nearest(path_of_plugin):
     with pytest.raises(UnknownNameError, match=r"did you mean 'pixel\.quality'"):
-        rb.run(scenes=["hamlet"], detectors=[path_of_plugin], rank_by="pixel.qualty")
+        rb.run(scenes=["hamlet"], detectors=[path_of_plugin], index="pixel.qualty")

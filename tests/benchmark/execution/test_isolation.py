@@ -7,7 +7,7 @@ import time
 import pytest
 
 from roofbench.benchmark.execution.isolation import IsolatedProcess, Limits
-from roofbench.benchmark.execution.tasks import Outcome
+from roofbench.benchmark.store.outcomes import Outcome
 
 
 @pytest.fixture(scope="module")

@@ -30,10 +30,10 @@ def suite(misbehaving):
     )
 
 
-def run(suite, path, *, jobs=0, overwrite="missing", only_failed=False, **limits):
+def run(suite, path, *, jobs=0, rerun="missing", only_failed=False, **limits):
     with Store(path) as store:
-        plan = make_plan(suite, store, overwrite=overwrite, only_failed=only_failed)
-        result = run_plan(plan, store, execution=Execution(jobs=jobs, limits=Limits(**limits)), overwrite=overwrite)
+        plan = make_plan(suite, store, rerun=rerun, only_failed=only_failed)
+        result = run_plan(plan, store, execution=Execution(jobs=jobs, limits=Limits(**limits)))
         judge = plan.evaluators[0]
         return plan, result, store.index_values([row.id for row in result.ok], judge.key)
 
@@ -53,9 +53,9 @@ def test_what_is_stored_is_not_run_again_but_failures_are(suite, tmp_path):
     plan, result, _ = run(suite, tmp_path / "a.sqlite")
     assert plan.counts() == {"nothing": 4, "detect": 2}
     assert result.done == 2
-    plan, _, _ = run(suite, tmp_path / "a.sqlite", overwrite="never")
+    plan, _, _ = run(suite, tmp_path / "a.sqlite", rerun="never")
     assert plan.counts() == {"nothing": 6}
-    plan, _, _ = run(suite, tmp_path / "a.sqlite", overwrite="always")
+    plan, _, _ = run(suite, tmp_path / "a.sqlite", rerun="always")
     assert plan.counts() == {"detect": 6}
 
 
@@ -71,8 +71,8 @@ def test_retry_failed_leaves_new_runs_alone(suite, tmp_path):
 
 def test_a_new_evaluator_reruns_no_detector(suite, tmp_path):
     run(suite, tmp_path / "a.sqlite")
-    judged_anew = replace(suite, evaluators=(make_evaluator("threshold-free[matching=overlap]"),))
-    plan, result, values = run(judged_anew, tmp_path / "a.sqlite", overwrite="never")
+    evaluated_again = replace(suite, evaluators=(make_evaluator("threshold-free[matching=overlap]"),))
+    plan, result, values = run(evaluated_again, tmp_path / "a.sqlite", rerun="never")
     assert plan.counts() == {"evaluate": 4, "nothing": 2}
     assert (result.done, result.evaluated, len(values)) == (0, 4, 4)
 

@@ -10,11 +10,11 @@ import pytest
 import shapely
 
 from roofbench.benchmark.execution.runner import score_stored
-from roofbench.benchmark.execution.tasks import Outcome, Score
 from roofbench.benchmark.execution.worker import execute
 from roofbench.benchmark.identity.keys import SourceClosure
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 from roofbench.benchmark.plan import KeyedEvaluator
+from roofbench.benchmark.store.outcomes import Outcome, Score
 from roofbench.benchmark.store.records import RunIdentity, evaluation_key
 from roofbench.benchmark.store.schema import MIGRATIONS, VERSION
 from roofbench.benchmark.store.writer import Store
@@ -215,7 +215,7 @@ def test_every_migration_leads_to_the_schema_of_a_new_store(tmp_path):
 WRITE = """
 import sys
 from roofbench.benchmark.store.writer import Store
-from roofbench.benchmark.execution.tasks import Outcome, Score
+from roofbench.benchmark.store.outcomes import Outcome, Score
 sys.path.insert(0, sys.argv[3])
 from test_store import identity
 with Store(sys.argv[1]) as store:

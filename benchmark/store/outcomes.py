@@ -1,0 +1,224 @@
+"""Outcomes: what became of a run, as the store keeps it and as bytes that any executor can carry.
+
+An *outcome* has a status (``ok``, ``failed`` or ``skipped``) with its reason, the cost, the raw detections, and one
+*score* for each evaluator. The *record* of a scene holds what is needed to evaluate and to draw it without opening it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, Self
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...evaluators.base import Evaluation
+from ...scenes.geodata.footprints import Footprints
+from ..identity.recipes import PluginRecipe
+
+__all__ = ["Cost", "Outcome", "SceneRecord", "Score", "Status", "footprints_of", "plain_value"]
+
+Status = Literal["ok", "failed", "skipped"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """What a detection cost, reading of the scene and evaluation excluded.
+
+    Attributes
+    ----------
+    seconds, cpu_seconds : float
+        Wall clock, and processor time of all threads.
+    peak_memory : int
+        Highest resident memory of the process during detection, bytes; 0 where the system does not tell.
+    """
+
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    peak_memory: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """One evaluation as the store keeps it; `summarise` of its evaluator gives the indices back without geometry.
+
+    Attributes
+    ----------
+    evaluator : PluginRecipe
+    code : str
+        Digest of the evaluator's source closure.
+    tallies : mapping
+        By dotted name, as JSON holds them.
+    values, notes
+        As of `Evaluation`.
+    verdicts : tuple of bytes
+        The verdict tables of the detections and of the references; empty when the evaluator gives none.
+    """
+
+    evaluator: PluginRecipe
+    code: str
+    tallies: Mapping[str, Any]
+    values: Mapping[str, float | None]
+    notes: tuple[str, ...]
+    verdicts: tuple[bytes, ...] = ()
+
+    @classmethod
+    def of(cls, evaluation: Evaluation, recipe: PluginRecipe, code: str) -> Self:
+        """Take what is kept from an evaluation."""
+        given = evaluation.verdicts
+        return cls(
+            evaluator=recipe,
+            code=code,
+            tallies=evaluation.tallies.to_dict(),
+            values=dict(evaluation.values),
+            notes=tuple(evaluation.notes),
+            verdicts=() if given is None else tuple(table.to_bytes() for _, table, _ in given.sides),
+        )
+
+
+def plain_value(value: Any) -> Any:
+    """Return a Python number, text or None of what a table or an evaluation holds; not-a-number becomes None."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return None if math.isnan(value) else value
+    return None if value is None or type(value).__name__ == "NAType" else str(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneRecord:
+    """What the store keeps of a scene: enough to evaluate and to draw verdicts without opening it again.
+
+    `picture` is a WebP file over the extent (see `scene_picture`), `point_count` the size of the point cloud.
+    """
+
+    content_hash: str
+    crs: str | None
+    extent: tuple[float, float, float, float]
+    grid: tuple[float, float, float, int, int] | None
+    area: bytes | None
+    reference: tuple[bytes, ...] | None
+    reference_ids: tuple[int, ...] = ()
+    building_ids: tuple[int | str, ...] | None = None
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    point_count: int | None = None
+    picture: bytes | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What became of a task.
+
+    Attributes
+    ----------
+    status : {"ok", "failed", "skipped"}
+    reason : str
+        One sentence of a failure or skip, else empty.
+    traceback : str
+        Of a failure, with the end of what the worker wrote to standard error.
+    cost : Cost
+    detections : tuple of bytes
+        WKB of each raw detection.
+    attributes : mapping of str to list
+        Further columns of the detections.
+    metadata : mapping
+        Facts of the whole set, and repairs.
+    scores : tuple of Score
+    scene : SceneRecord, optional
+    machine : mapping
+        Where it ran.
+    """
+
+    status: Status
+    reason: str = ""
+    traceback: str = ""
+    cost: Cost = field(default_factory=Cost)
+    detections: tuple[bytes, ...] = ()
+    attributes: Mapping[str, list[Any]] = field(default_factory=dict)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+    scores: tuple[Score, ...] = ()
+    scene: SceneRecord | None = None
+    machine: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_bytes(self) -> bytes:
+        """Return a JSON header followed by the geometries."""
+        header = _fields(self)
+        header["cost"] = _fields(self.cost)
+        header["scores"] = [
+            {**_fields(score), "evaluator": score.evaluator.to_dict(), "verdicts": len(score.verdicts)}
+            for score in self.scores
+        ]
+        blobs = [*self.detections, *(table for score in self.scores for table in score.verdicts)]
+        header["detections"] = len(self.detections)
+        if self.scene is not None:
+            header["scene"] = _fields(self.scene)
+            reference = self.scene.reference
+            blobs += [*(reference or ()), self.scene.area or b"", self.scene.picture or b""]
+            header["scene"]["reference"] = None if reference is None else len(reference)
+            header["scene"]["area"] = header["scene"]["picture"] = None
+        text = json.dumps(header).encode()
+        lengths = np.array([len(blob) for blob in blobs], dtype="<u8").tobytes()
+        return b"".join([struct.pack("<QQ", len(text), len(blobs)), text, lengths, *blobs])
+
+    @classmethod
+    def from_bytes(cls, message: bytes) -> Self:
+        """Read what `to_bytes` wrote."""
+        size, count = struct.unpack_from("<QQ", message)
+        header = json.loads(message[16 : 16 + size])
+        start = 16 + size
+        ends = start + 8 * count + np.cumsum(np.frombuffer(message, "<u8", count, start)).astype(int)
+        begins = [start + 8 * count, *ends[:-1].tolist()]
+        blobs = [message[begin:end] for begin, end in zip(begins, ends.tolist(), strict=False)]
+        number = header["detections"]
+        header["detections"] = tuple(blobs[:number])
+        header["cost"] = Cost(**header["cost"])
+        scores = []
+        for score in header["scores"]:
+            tables = tuple(blobs[number : number + score["verdicts"]])
+            number += len(tables)
+            recipe, notes = PluginRecipe(**score["evaluator"]), tuple(score["notes"])
+            scores.append(Score(**{**score, "evaluator": recipe, "notes": notes, "verdicts": tables}))
+        header["scores"] = tuple(scores)
+        if header["scene"] is not None:
+            record = header["scene"]
+            if record["reference"] is not None:
+                record["reference"] = tuple(blobs[number : number + record["reference"]])
+            record["area"], record["picture"] = (blob or None for blob in blobs[-2:])
+            for name in ("extent", "grid", "reference_ids", "building_ids"):
+                record[name] = None if record[name] is None else tuple(record[name])
+            header["scene"] = SceneRecord(**record)
+        return cls(**header)
+
+
+def _fields(record: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass by name, without going deeper as `dataclasses.asdict` does."""
+    return {field.name: getattr(record, field.name) for field in fields(record)}
+
+
+def footprints_of(
+    wkb: Sequence[bytes],
+    *,
+    crs: str | None,
+    ids: Sequence[int] | None = None,
+    building_ids: Sequence[Any] | None = None,
+    attributes: Mapping[str, Sequence[Any]] | None = None,
+    source: str,
+) -> Footprints:
+    """Return stored geometries, which were checked when they came in, as footprints."""
+    polygons: NDArray[np.object_] = np.empty(len(wkb), dtype=object)
+    polygons[:] = shapely.from_wkb(list(wkb))
+    return Footprints(
+        polygons=polygons,
+        crs=crs,
+        ids=np.arange(len(wkb), dtype=np.int64) if ids is None else np.asarray(ids, dtype=np.int64),
+        building_ids=None if building_ids is None else np.asarray(building_ids),
+        attributes={name: np.asarray(column) for name, column in (attributes or {}).items()},
+        source=source,
+    )
