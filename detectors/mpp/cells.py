@@ -31,6 +31,7 @@ from ...core.kernels import kernel
 from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
+from ...scenes.geodata.sampling import bilinear_at
 from .workers import ALONE, Workers
 
 __all__ = ["FEWEST_POINTS", "HIGH", "LOW", "VOID", "Cells", "cell_size", "has_points", "make_cells"]
@@ -159,15 +160,7 @@ def _cell_of(x, y, frame, first, last, columns):  # type: ignore[no-untyped-def]
 def _above(x, y, z, ground, place):  # type: ignore[no-untyped-def]
     """Return the height above ground in centimetres, `_ASTRAY` where there is none or it is in the sky."""
     west, north, cell = place
-    rows, columns = ground.shape
-    v = min(max((north - y) / cell - 0.5, 0.0), rows - 1.0)
-    u = min(max((x - west) / cell - 0.5, 0.0), columns - 1.0)
-    r0, c0 = int(v), int(u)
-    r1, c1 = min(r0 + 1, rows - 1), min(c0 + 1, columns - 1)
-    down, right = v - r0, u - c0
-    upper = ground[r0, c0] + right * (ground[r0, c1] - ground[r0, c0])
-    lower = ground[r1, c0] + right * (ground[r1, c1] - ground[r1, c0])
-    h = z - (upper + down * (lower - upper))
+    h = z - bilinear_at(ground, west, north, cell, x, y)
     return math.floor(h * 100.0 + 0.5) if -_SKY < h < _SKY else _ASTRAY
 
 

@@ -26,6 +26,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.errors import InputError
+from .crs import crs_label
 from .vector_columns import labels_of
 
 __all__ = ["Footprints", "Repair", "polygonal_part"]
@@ -169,7 +170,7 @@ class Footprints:
         return len(self.polygons)
 
     def __repr__(self) -> str:
-        return f"<Footprints {len(self)} polygons, {self.crs or 'no CRS'}, {self.source}>"
+        return f"<Footprints {len(self)} polygons, {crs_label(self.crs)}, {self.source}>"
 
     def take(self, index: NDArray[Any]) -> Footprints:
         """Return the footprints at `index` (integers or a mask)."""

@@ -9,7 +9,21 @@ from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 
-__all__ = ["bilinear"]
+__all__ = ["bilinear", "bilinear_at"]
+
+
+@kernel(inline="always")
+def bilinear_at(values: NDArray[np.float32], west: float, north: float, cell: float, x: float, y: float) -> float:
+    """Return the value at one point; see `bilinear`. The coordinates must be finite."""
+    rows, columns = values.shape
+    row = min(max((north - y) / cell - 0.5, 0.0), rows - 1.0)
+    column = min(max((x - west) / cell - 0.5, 0.0), columns - 1.0)
+    top, left = min(int(row), max(rows - 2, 0)), min(int(column), max(columns - 2, 0))
+    bottom, right = min(top + 1, rows - 1), min(left + 1, columns - 1)
+    down, across = row - top, column - left
+    upper = values[top, left] * (1 - across) + values[top, right] * across
+    lower = values[bottom, left] * (1 - across) + values[bottom, right] * across
+    return float(upper * (1 - down) + lower * down)
 
 
 @kernel
@@ -31,18 +45,8 @@ def bilinear(
     x, y : ndarray, shape (n,)
         Metres; a point that is not finite gives NaN.
     """
-    rows, columns = values.shape
     result = np.empty(len(x))
     for i in range(len(x)):
-        if not (math.isfinite(x[i]) and math.isfinite(y[i])):
-            result[i] = np.nan
-            continue
-        row = min(max((north - y[i]) / cell - 0.5, 0.0), rows - 1.0)
-        column = min(max((x[i] - west) / cell - 0.5, 0.0), columns - 1.0)
-        top, left = min(int(row), max(rows - 2, 0)), min(int(column), max(columns - 2, 0))
-        bottom, right = min(top + 1, rows - 1), min(left + 1, columns - 1)
-        down, across = row - top, column - left
-        upper = values[top, left] * (1 - across) + values[top, right] * across
-        lower = values[bottom, left] * (1 - across) + values[bottom, right] * across
-        result[i] = upper * (1 - down) + lower * down
+        known = math.isfinite(x[i]) and math.isfinite(y[i])
+        result[i] = bilinear_at(values, west, north, cell, x[i], y[i]) if known else np.nan
     return result

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...core.errors import CRSError, InputError, OutputError
 from ...core.output import whole_file
 from ...core.registry import nearest_hint
-from .crs import common_crs, crs_label, named_crs, parse_crs, require_metric, same_crs
+from .crs import common_crs, crs_label, crs_text, named_crs, parse_crs, require_metric, same_crs
 from .footprints import Footprints, Repair
 from .vector_columns import storable_columns
 
@@ -277,7 +277,7 @@ def _read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[An
             if values.dtype.kind == "O":
                 values = np.where(frame[name].isna(), None, values)
             columns[str(name)] = values
-    return np.asarray(frame.geometry.array, dtype=object), columns, _crs_text(frame.crs)
+    return np.asarray(frame.geometry.array, dtype=object), columns, None if frame.crs is None else crs_text(frame.crs)
 
 
 def _write_ogr(
