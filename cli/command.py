@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 __all__ = ["Command", "RunOptions", "load_plugins", "option_names", "with_run_options"]
 
 #: ``crs=``, ``overwrite=True``, ``ground_filter='opening'``; not inside ``name[parameter=value]``.
-_PARAMETER = re.compile(r"(?<![\[\w,.-])([a-z][a-z_]*)=(?:(True|False)\b|'([^']*)'|([\w.:/-]*\w))?")
+_PARAMETER = re.compile(
+    r"(?<![\[\w,.-])([a-z][a-z_]*)=(?:(?P<flag>True|False)\b|'(?P<text>[^']*)'|\((?P<tuple>[^)]*)\)|(?P<word>[\w.:/,=-]*\w))?"
+)
 
 #: Choices as some versions of typer print them.
 _CHOICES = re.compile(r"<([\w|-]+)>")
@@ -59,13 +61,17 @@ def option_names(message: str, options: dict[str, str]) -> str:
     'out exists: set --overwrite or use another name'
     >>> option_names("use ground_filter='opening'", {"ground_filter": "--ground-filter"})
     'use --ground-filter opening'
+    >>> option_names("ground_filter= must be opening or cloth", {"ground_filter": "--ground-filter"})
+    '--ground-filter must be opening or cloth'
+    >>> option_names("set extent=(0, 0, 9, 9)", {"extent": "--extent"})
+    'set --extent 0 0 9 9'
     """
 
     def replaced(match: re.Match[str]) -> str:
         option = options.get(match[1])
-        if option is None or match[2] == "False":
+        if option is None or match["flag"] == "False":
             return match[0]
-        value = match[3] or match[4]
+        value = match["text"] or match["word"] or (match["tuple"] or "").replace(",", "")
         return f"{option} {value}" if value else option
 
     return _PARAMETER.sub(replaced, message)
@@ -88,7 +94,7 @@ class Command(typer.core.TyperCommand):
             if _is_argument(parameter):
                 sections["Arguments"].append((str(parameter.metavar), record[1]))
             else:
-                sections["Options"].append((_CHOICES.sub(r"[\1]", record[0]), record[1]))
+                sections["Options"].append((_CHOICES.sub(r"[\1]", record[0]), _ranges_in_words(record[1])))
         for title, records in sections.items():
             if records:
                 with formatter.section(title):
@@ -107,6 +113,12 @@ class Command(typer.core.TyperCommand):
 
 def _is_argument(parameter: Any) -> bool:
     return str(parameter.param_type_name) == "argument"
+
+
+def _ranges_in_words(text: str) -> str:
+    """Replace ``x>=1`` by ``at least 1``."""
+    text = re.sub(r"([\w.+-]+)<=x<=([\w.+-]+)", r"from \1 to \2", text)
+    return re.sub(r"\bx>=([\w.+-]+)", r"at least \1", text)
 
 
 def _usage(argument: Any) -> str:

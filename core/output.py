@@ -26,7 +26,7 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def check_target(path: Path, overwrite: bool) -> None:
     """Raise `OutputError` when a file or folder cannot be written; call it before long work."""
     if path.exists() and not overwrite:
-        raise OutputError(f"{path} exists already: add --overwrite (in Python: overwrite=True) or name another file")
+        raise OutputError(f"{path} exists already: set overwrite=True or name another file")
     if not path.parent.is_dir():
         raise OutputError(f"{path} cannot be written: there is no folder {path.parent}")
     if not os.access(path.parent, os.W_OK):

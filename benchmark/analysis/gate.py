@@ -74,14 +74,14 @@ def margins_of(texts: Sequence[str], indices: Sequence[Index]) -> dict[str, floa
         key = key.strip()
         if key not in margins:
             raise UnknownNameError(
-                f"--margin {text}: {key!r} is not gated{nearest_hint(key, margins)}; gated are {', '.join(margins)}"
+                f"margin={text}: {key!r} is not gated{nearest_hint(key, margins)}; gated are {', '.join(margins)}"
             )
         try:
             margins[key] = float(value)
         except ValueError:
-            raise ParameterError(f"cannot read --margin {text!r}: write INDEX=NUMBER, fractions as 0.005") from None
+            raise ParameterError(f"cannot read margin {text!r}: write INDEX=NUMBER, fractions as 0.005") from None
         if not 0 <= margins[key] < float("inf"):
-            raise ParameterError(f"--margin {text}: a margin is at least 0")
+            raise ParameterError(f"margin={text}: a margin is at least 0")
     return margins
 
 

@@ -103,7 +103,7 @@ def read_sweep_table(path: Path, *, indices: Sequence[str] = (), level: float = 
         if axis in mine.columns:
             lines += _lines_of(mine, str(evaluator), str(detector), str(axis), indices, level)
     if not lines:
-        raise InputError(f"{path}: holds no axis that was varied alone: sweep without --grid")
+        raise InputError(f"{path}: holds no axis that was varied alone: sweep without grid=True")
     return lines
 
 

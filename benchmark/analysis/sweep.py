@@ -121,12 +121,12 @@ def axis_of(text: str) -> Axis:
     name, equals, listed = text.partition("=")
     name, words = name.strip(), [word.strip() for word in listed.split(",") if word.strip()]
     if not (name and equals and words):
-        raise ParameterError(f"cannot read --vary {text!r}: write NAME=VALUE,VALUE,... or NAME=FROM:TO:STEP")
+        raise ParameterError(f"cannot read vary={text!r}: write NAME=VALUE,VALUE,... or NAME=FROM:TO:STEP")
     values: list[Any] = []
     for word in words:
         values += _range(word, text) if word.count(":") == 2 else [_value(word)]
     if len(set(values)) != len(values):
-        raise ParameterError(f"--vary {text!r} names a value twice")
+        raise ParameterError(f"vary={text!r} names a value twice")
     return Axis(name, tuple(values))
 
 
@@ -143,7 +143,7 @@ def _range(word: str, text: str) -> list[Any]:
     start, end, step = (_value(part) for part in word.split(":"))
     numbers = all(isinstance(number, int | float) and not isinstance(number, bool) for number in (start, end, step))
     if not numbers or not step or (end - start) / step < 0 or (end - start) / step > 10_000:
-        raise ParameterError(f"cannot read {word!r} in --vary {text!r}: write FROM:TO:STEP")
+        raise ParameterError(f"cannot read {word!r} in vary={text!r}: write FROM:TO:STEP")
     count = math.floor((end - start) / step + 1e-9) + 1
     return [start + place * step for place in range(count)]
 
@@ -189,7 +189,7 @@ def _check_axes(suite: Suite, axes: Sequence[Axis]) -> None:
     known = {name for entry in suite.detectors for name in entry.detector.parameters()}
     synthetic = any(not isinstance(scene, Scene) and scene.kind == "preset" for scene in suite.scenes)
     if not axes:
-        raise ParameterError("nothing is varied: give --vary NAME=VALUE,VALUE,...")
+        raise ParameterError("nothing is varied: give vary=NAME=VALUE,VALUE,...")
     for axis in axes:
         if axis.of_scene and not synthetic:
             raise ParameterError(

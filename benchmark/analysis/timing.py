@@ -90,7 +90,7 @@ def _unpacked(commit: str | None) -> Iterator[Path]:
         except (OSError, subprocess.SubprocessError) as error:
             raise UnsupportedError(
                 f"the commit {commit[:10]} of the baseline is not in this repository: fetch it (in CI, a checkout "
-                "with its whole history), or leave out --time"
+                "with its whole history), or leave out time=True"
             ) from error
         with tarfile.open(archive) as packed:
             packed.extractall(target, filter="data")

@@ -29,7 +29,7 @@ def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
         It cannot be opened.
     """
     if must_exist and not path.is_file():
-        raise InputError(f"{path}: no such results store; 'roofbench run' makes one, or name it with --store")
+        raise InputError(f"{path}: no such results store; 'roofbench run' makes one, or name it by store=")
     if not path.parent.is_dir():
         raise OutputError(f"{path} cannot be written: there is no folder {path.parent}")
     # In a folder that cannot be written SQLite finds no place for its side files: the store is opened to be read.

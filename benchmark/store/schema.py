@@ -147,9 +147,9 @@ def prepare(connection: sqlite3.Connection, path: Path) -> None:
         (version,) = connection.execute("PRAGMA user_version").fetchone()
         tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     except sqlite3.DatabaseError as error:
-        raise InputError(f"{path} is no results store: {error}; name another file with --store") from error
+        raise InputError(f"{path} is no results store: {error}; name another file by store=") from error
     if (version == 0 and tables) or (version and "runs" not in tables):
-        raise InputError(f"{path} is a database of something else: name another file with --store")
+        raise InputError(f"{path} is a database of something else: name another file by store=")
     if version > VERSION:
         raise InputError(
             f"{path} was written by a newer roofbench (schema {version}, this one knows {VERSION}): upgrade roofbench"

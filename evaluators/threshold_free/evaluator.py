@@ -182,8 +182,8 @@ class ThresholdFree(Evaluator):
             return Grid(west, north, self.gsd, 1, 1)
         if grid is None and self.area == "pixels":
             raise InputError(
-                "area by pixels needs a ground sampling distance where there is no orthoimage: give --gsd "
-                "(in Python: gsd=), or use --area exact"
+                "area by pixels needs a ground sampling distance where there is no orthoimage: give "
+                "gsd= or use area='exact'"
             )
         return grid
 

@@ -101,7 +101,7 @@ def require_metric(text: str | None, where: str, *, heights: bool = True, remedy
     if crs.is_geographic:
         raise CRSError(
             f"{where}: {crs_label(text)} is geographic (degrees), areas and distances need metres: "
-            f"{remedy or _REPROJECT + ', or name its true CRS with --crs'}"
+            f"{remedy or _REPROJECT + ', or set its true CRS by crs='}"
         )
     unit = crs.axis_info[0] if crs.axis_info else None
     if unit is not None and abs(unit.unit_conversion_factor - 1.0) > 1e-9:
@@ -159,8 +159,7 @@ def common_crs(first: str | None, second: str | None, names: tuple[str, str]) ->
     if first is None or second is None:
         lacking, other = (names[0], second) if first is None else (names[1], first)
         raise CRSError(
-            f"{lacking} has no coordinate reference system while the other is in {crs_label(other)}: "
-            "name it with --crs (in Python: crs=)"
+            f"{lacking} has no coordinate reference system while the other is in {crs_label(other)}: set it by crs="
         )
     if not same_crs(first, second):
         raise CRSError(

@@ -343,9 +343,7 @@ def _header_crs(file: Path, header: Any) -> str | None:
     try:
         crs = header.parse_crs()
     except ProjError as error:
-        raise CRSError(
-            f"{file}: its CRS record cannot be read ({error}): name the CRS with --crs (in Python: crs=)"
-        ) from error
+        raise CRSError(f"{file}: its CRS record cannot be read ({error}): name the CRS by crs=") from error
     if crs is None:
         return None
     require_metric(crs.to_wkt(), str(file), remedy=_REPROJECT)

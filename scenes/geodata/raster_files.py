@@ -178,22 +178,24 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
     if bands is not None:
         unknown = [name for name in bands if name not in (*BANDS, "-")]
         if unknown:
-            raise InputError(f"--bands: {unknown[0]!r} is no band name; use {', '.join(BANDS)}, and - to skip one")
+            raise InputError(
+                f"bands= has {unknown[0]!r}, which is no band name; use {', '.join(BANDS)}, and - to skip one"
+            )
         if len(bands) != header.band_count and not (header.alpha and len(bands) == header.band_count + 1):
             raise InputError(
-                f"{header.path} has {header.band_count} bands, but --bands names {len(bands)} "
+                f"{header.path} has {header.band_count} bands, but bands= names {len(bands)} "
                 f"({','.join(bands)}): name one for each, - to skip one"
             )
         named = [name for name in bands if name != "-"]
         if len(set(named)) != len(named) or not named:
-            raise InputError(f"--bands: {','.join(bands)} must name at least one band and none twice")
+            raise InputError(f"bands={','.join(bands)} must name at least one band and none twice")
         return tuple(bands)
     if all(name in BANDS for name in header.band_names) and len(set(header.band_names)) == header.band_count:
         return header.band_names
     if header.band_count not in _DEFAULT_BANDS:
         raise InputError(
             f"{header.path} has {header.band_count} bands, expected 1 (grey), 3 (red, green, blue) or 4 (and nir): "
-            "name them with --bands, - to skip one"
+            "name them by bands=, - to skip one"
         )
     return _DEFAULT_BANDS[header.band_count]
 

@@ -67,9 +67,7 @@ def outlines_of_class(
     chosen = points.classification == code
     if not chosen.any():
         classes = ", ".join(map(str, np.unique(points.classification)))
-        raise InputError(
-            f"{source}: no point is of class {code} (there are {classes}): give footprints with --reference"
-        )
+        raise InputError(f"{source}: no point is of class {code} (there are {classes}): give footprints by reference=")
     x, y = points.x[chosen], points.y[chosen]
     grid = _padded(Grid.covering(extent, cell if cell is not None else _cell(x, y, extent)))
     index, inside = grid.cells(x, y)

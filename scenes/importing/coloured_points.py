@@ -50,7 +50,7 @@ def image_from_points(
     from scipy import ndimage
 
     if points.colour is None:
-        raise InputError(f"{source}: the points carry no colour, so no orthoimage can be made of them; give --ortho")
+        raise InputError(f"{source}: the points carry no colour, so no orthoimage can be made of them; give ortho=")
     x, y, colour = points.x, points.y, points.colour
     if points.return_number is not None:
         first = points.return_number == 1

@@ -82,7 +82,7 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
     cloud = read_points([header.path for header in clouds], window=place.extent, progress=progress)
     names = some([header.path for header in clouds])
     if len(cloud) == 0:
-        raise InputError(f"{names} has no points in {text(place.extent)}: choose another --extent")
+        raise InputError(f"{names} has no points in {text(place.extent)}: choose another extent=")
     _check_bounds(place, cloud, names)
     wild = (cloud.z < _LOWEST_LAND) | (cloud.z > _HIGHEST_LAND)
     if wild.any():
@@ -109,13 +109,13 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
 def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, bands: Sequence[str] | None) -> Image:
     """Return the mosaic of orthoimages on the cells of the first, or on cells of `gsd` metres."""
     grid = _grid(place, images[0], gsd)
-    _check_size(place, grid.gsd, "--gsd")
+    _check_size(place, grid.gsd, "gsd")
     _note_resampling(place, images, grid)
     image = mosaic_image(images, grid, crs=place.crs, bands=bands)
     if bands is None and (marked := [header.path for header in images if looks_like_values(header)]):
         place.log.note(
             f"{brief(marked)}: the last band is marked as alpha and was taken for the mask, but holds many values: "
-            "if it is near infrared, give --bands red,green,blue,nir"
+            "if it is near infrared, name the bands: red,green,blue,nir"
         )
     if image.valid is not None and not image.valid.any():
         raise InputError(
@@ -129,7 +129,7 @@ def image_of_points(place: Place, points: PointCloud, gsd: float | None, files: 
     """Return the orthoimage that coloured points give."""
     from .coloured_points import image_from_points
 
-    _check_size(place, gsd or 0.1, "--gsd")
+    _check_size(place, gsd or 0.1, "gsd")
     image = image_from_points(points, place.extent, gsd=gsd, source=some(files))
     how = place.log.derived["image"] = f"rastered from the colours of the points, at {image.grid.gsd:g} m"
     place.log.note(f"the orthoimage was {how}")
@@ -147,7 +147,7 @@ def dem_of(place: Place, models: Sequence[RasterHeader], cell: float | None, poi
             f"{text(place.extent)}: check that they show the same place in the CRS that they name"
         )
     grid = _grid(place, models[0], cell)
-    _check_size(place, grid.gsd, "--dem-cell")
+    _check_size(place, grid.gsd, "dem_cell")
     _note_resampling(place, models, grid)
     dem = mosaic_elevation(models, grid, crs=place.crs)
     unknown = np.isnan(dem.values)
@@ -176,7 +176,7 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
     """Return the bare earth that the points give: of those classified as ground, else by a ground filter."""
     from ..ground.filter import elevation_from_points, ground_surface
 
-    _check_size(place, cell or 1.0, "--dem-cell")
+    _check_size(place, cell or 1.0, "dem_cell")
     classes = points.classification
     if ground_filter == "cloth":
         from ..ground.cloth import cloth_surface
@@ -294,18 +294,18 @@ def _check_bounds(place: Place, cloud: PointCloud, names: str) -> None:
     if (xmax - xmin) * (ymax - ymin) > 1e7 and share < 0.25:
         raise InputError(
             f"{names}: the header says {text(place.extent)}, but the points lie in {text(real)}: give "
-            f"--extent {real[0]:.0f} {real[1]:.0f} {real[2]:.0f} {real[3]:.0f}"
+            f"extent=({real[0]:.0f}, {real[1]:.0f}, {real[2]:.0f}, {real[3]:.0f})"
         )
 
 
-def _check_size(place: Place, cell: float, option: str) -> None:
+def _check_size(place: Place, cell: float, parameter: str) -> None:
     """Refuse rasters that would fill the memory: a stray point far away, or cells that are too small."""
     xmin, ymin, xmax, ymax = place.extent
     columns, rows = (xmax - xmin) / cell, (ymax - ymin) / cell
     if rows * columns > _MOST_CELLS:
         raise InputError(
             f"the scene, {text(place.extent)}, would have {rows:,.0f} x {columns:,.0f} cells of {cell:g} m: "
-            f"cut it with --extent, or choose larger cells with {option}"
+            f"cut it by extent=, or choose larger cells by {parameter}="
         )
 
 

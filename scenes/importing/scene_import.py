@@ -123,23 +123,23 @@ def import_scene(
     """
     point_files, image_files, dem_files = _paths(points), _paths(ortho), _paths(dem)
     _check_choices(
-        {"points": point_files, "ortho": image_files, "reference": reference, "building-id": building_id},
+        {"points": point_files, "ortho": image_files, "reference": reference, "building_id": building_id},
         {
-            "reference-from-class": reference_from_class,
-            "ortho-from-points": ortho_from_points,
-            "as-rectangles": as_rectangles,
-            "join-gaps": join_gaps is not None,
+            "reference_from_class": reference_from_class,
+            "ortho_from_points": ortho_from_points,
+            "as_rectangles": as_rectangles,
+            "join_gaps": join_gaps is not None,
         },
-        {"gsd": gsd, "dem-cell": dem_cell},
+        {"gsd": gsd, "dem_cell": dem_cell},
     )
     if ground_filter not in (None, "opening", "cloth"):
-        raise ParameterError(f"--ground-filter must be opening or cloth, not {ground_filter!r}")
+        raise ParameterError(f"ground_filter= must be opening or cloth, not {ground_filter!r}")
     if ground_filter is not None and dem_files:
-        raise ParameterError("give --dem or --ground-filter, not both")
+        raise ParameterError("give dem= or ground_filter=, not both")
     if bands is not None and not image_files:
-        raise ParameterError("--bands names the bands of an image: give --ortho")
+        raise ParameterError("bands= names the bands of an image: give ortho=")
     if name is not None and not name.strip():
-        raise ParameterError("--name must not be empty: leave it out for the name of the folder")
+        raise ParameterError("name= must not be empty: leave it out for the name of the folder")
     wanted = None if extent is None else _checked_extent(extent)
     target = Path(output)
     check_folder(target, overwrite, holds=HOLDS)
@@ -201,40 +201,40 @@ def import_scene(
 def _check_choices(given: dict[str, object], asked: dict[str, bool], lengths: dict[str, float | None]) -> None:
     """Raise `ParameterError` when what was asked for excludes or lacks something."""
     if not given["points"] and not given["ortho"]:
-        raise ParameterError("a scene needs points or an orthoimage: give --points or --ortho")
-    for one, other in (("reference", "reference-from-class"), ("ortho", "ortho-from-points")):
+        raise ParameterError("a scene needs points or an orthoimage: give points= or ortho=")
+    for one, other in (("reference", "reference_from_class"), ("ortho", "ortho_from_points")):
         if given[one] and asked[other]:
-            raise ParameterError(f"give --{one} or --{other}, not both")
-    for other in ("reference-from-class", "ortho-from-points"):
+            raise ParameterError(f"give {one}= or {other}=, not both")
+    for other in ("reference_from_class", "ortho_from_points"):
         if asked[other] and not given["points"]:
-            raise ParameterError(f"--{other} needs points: give --points")
-    for option in ("as-rectangles", "join-gaps"):
-        if asked[option] and not (given["reference"] or asked["reference-from-class"]):
-            raise ParameterError(f"--{option} needs a reference: give --reference or --reference-from-class")
-    if given["building-id"] and not given["reference"]:
-        raise ParameterError("--building-id names a column of the reference: give --reference")
+            raise ParameterError(f"{other}= needs points: give points=")
+    for option in ("as_rectangles", "join_gaps"):
+        if asked[option] and not (given["reference"] or asked["reference_from_class"]):
+            raise ParameterError(f"{option}= needs a reference: give reference= or reference_from_class=")
+    if given["building_id"] and not given["reference"]:
+        raise ParameterError("building_id= names a column of the reference: give reference=")
     for name, value in lengths.items():
         if value is not None and not 0.01 <= value <= 100:
-            raise ParameterError(f"--{name} must be from 0.01 to 100 m, not {value:g}")
+            raise ParameterError(f"{name}= must be from 0.01 to 100 m, not {value:g}")
 
 
 def _checked_extent(extent: Sequence[float]) -> Extent:
     if len(extent) != 4 or not np.isfinite(extent).all() or extent[2] <= extent[0] or extent[3] <= extent[1]:
-        raise ParameterError(f"--extent {tuple(extent)} must be xmin ymin xmax ymax, metres, of an area")
+        raise ParameterError(f"extent={tuple(extent)} must be xmin ymin xmax ymax, metres, of an area")
     xmin, ymin, xmax, ymax = map(float, extent)
     return xmin, ymin, xmax, ymax
 
 
 def _decide_crs(given: str | None, clouds: list[LasHeader], images: list[RasterHeader], log: ImportLog) -> str:
     if given is not None:
-        require_metric(given, "--crs", remedy="name a projected one, such as EPSG:25832")
+        require_metric(given, "crs", remedy="name a projected one, such as EPSG:25832")
         given = named_crs(given)
     named = [cloud for cloud in clouds if cloud.crs is not None]
     for cloud in named:
         other = given if given is not None else named[0].crs
         assert cloud.crs is not None
         if other is not None and not same_crs(cloud.crs, other):
-            whose = "--crs says" if given is not None else f"{named[0].path} is in"
+            whose = "crs= says" if given is not None else f"{named[0].path} is in"
             raise CRSError(
                 f"{cloud.path} is in {crs_label(cloud.crs)} but {whose} {crs_label(other)}: point files must share "
                 "one CRS, reproject this one, for instance with pdal's filters.reprojection"
@@ -244,13 +244,13 @@ def _decide_crs(given: str | None, clouds: list[LasHeader], images: list[RasterH
     if nameless and given is None and named:
         raise CRSError(
             f"{nameless[0]} names no CRS while {named[0].path} is in {crs_label(crs)}: if it is in the same, "
-            "say so with --crs"
+            "say so by crs="
         )
     if crs is None:
         crs = next((image.crs for image in images if image.crs is not None), None) if not clouds else None
     if crs is None:
         first = nameless[0] if nameless else images[0].path
-        raise CRSError(f"{first} names no coordinate reference system: name it with --crs, for instance EPSG:25832")
+        raise CRSError(f"{first} names no coordinate reference system: set it by crs=, for instance EPSG:25832")
     if nameless:
         log.note(_assumed(nameless, crs))
     require_metric(crs, str(images[0].path) if images and not clouds else "the scene")
@@ -279,7 +279,7 @@ def _decide_extent(
         shown = (*corners[:, :2].min(axis=0).tolist(), *corners[:, 2:].max(axis=0).tolist())
         parts.append((f"{layers.some([i.path for i in images])} (image)", shown))
     if wanted is not None:
-        parts.append(("--extent", wanted))
+        parts.append(("the extent asked for", wanted))
     where, extent = parts[0]
     for other, bounds in parts[1:]:
         common = layers.common(extent, bounds)

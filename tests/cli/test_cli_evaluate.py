@@ -191,7 +191,7 @@ BAD_INPUT = {
     "missing file": (["x.gpkg", "r.gpkg"], "x.gpkg: no such file"),
     "no vector file": (["noise.gpkg", "r.gpkg"], "noise.gpkg cannot be read as a vector file"),
     "other CRS": (["utm33.gpkg", "r.gpkg"], "utm33.gpkg is in EPSG:25833 but r.gpkg in EPSG:25832"),
-    "no CRS on one side": (["bare.fgb", "r.gpkg"], "name it with --crs"),
+    "no CRS on one side": (["bare.fgb", "r.gpkg"], "set it by --crs"),
     "geographic CRS": (["degrees.gpkg", "r.gpkg"], "geographic"),
     "no polygons": (["points.gpkg", "r.gpkg"], "no polygons"),
     "no geometry": (["table.csv", "r.gpkg"], "table.csv"),

@@ -196,7 +196,7 @@ def test_a_file_that_is_no_baseline_is_one_sentence(tmp_path, text):
 def test_margins_are_read_by_index():
     assert margins_of(["pixel.correctness=0.01"], INDICES)["pixel.correctness"] == 0.01
     for wrong in ("pixel.corectness=0.01", "pixel.correctness=much", "pixel.correctness=-1"):
-        with pytest.raises(RoofbenchError, match="--margin"):
+        with pytest.raises(RoofbenchError, match="margin"):
             margins_of([wrong], INDICES)
 
 

@@ -321,7 +321,7 @@ def test_a_layer_without_polygons_is_told(geojson):
 def test_nothing_is_replaced_or_left_half_written(tmp_path):
     footprints = rb.Footprints.of(SQUARES, crs=CRS)
     rb.write_footprints(footprints, tmp_path / "out.gpkg")
-    with pytest.raises(OutputError, match="exists already: add --overwrite"):
+    with pytest.raises(OutputError, match="exists already: set overwrite=True"):
         rb.write_footprints(footprints, tmp_path / "out.gpkg")
     complex_column = rb.Footprints.of(SQUARES, crs=CRS, attributes={"c": np.array([1j, 2, 3])})
     before = (tmp_path / "out.gpkg").read_bytes()

@@ -386,7 +386,7 @@ def test_an_import_can_replace_a_scene(files, bring):
     assert bring("points.laz")[0] == 0
     code, _, err = bring("points.laz")
     assert code == 2
-    assert "out exists already: add --overwrite" in err
+    assert "out exists already: set --overwrite" in err
     assert bring("points.laz", "ortho.tif", "--overwrite")[0] == 0
     assert (files / "out" / "ortho.tif").exists()
 
@@ -396,7 +396,7 @@ def test_an_import_can_replace_a_scene(files, bring):
 
 def test_points_without_a_crs(files, refused):
     write_points(small_scenes.cloud(), files / "bare.laz")
-    assert "bare.laz names no coordinate reference system: name it with --crs" in refused("bare.laz")
+    assert "bare.laz names no coordinate reference system: set it by --crs" in refused("bare.laz")
 
 
 def test_points_of_two_crs(files, refused):
@@ -445,7 +445,7 @@ def test_feet_in_the_keys_of_old_files(files, refused, key, what):
 
 def test_an_unknown_crs(refused):
     assert "'EPSG:999999' is no coordinate reference system" in refused("points.laz", "--crs", "EPSG:999999")
-    assert "--crs: EPSG:4326 is geographic" in refused("points.laz", "--crs", "EPSG:4326")
+    assert "crs: EPSG:4326 is geographic" in refused("points.laz", "--crs", "EPSG:4326")
 
 
 def test_a_cloud_without_points(files, refused):
@@ -529,7 +529,7 @@ def test_a_wrong_number_of_bands(files, refused):
     assert "ortho.tif has 3 bands, but --bands names 4" in message
     tiff(files / "five.tif", count=5)
     assert "five.tif has 5 bands, expected 1 (grey), 3 (red, green, blue) or 4" in refused("points.laz", "five.tif")
-    assert "'pink' is no band name" in refused("points.laz", "ortho.tif", "--bands", "red,green,pink")
+    assert "'pink', which is no band name" in refused("points.laz", "ortho.tif", "--bands", "red,green,pink")
     assert "none twice" in refused("points.laz", "ortho.tif", "--bands", "red,red,blue")
 
 
@@ -615,7 +615,7 @@ def test_a_reference_from_points_that_are_no_buildings(files, refused):
     cloud = small_scenes.cloud()
     write_points(cloud.take(cloud.classification == 2), files / "ground.laz", crs=CRS)
     message = refused("ground.laz", "--reference-from-class")
-    assert "ground.laz: no point is of class 6 (there are 2): give footprints with --reference" in message
+    assert "ground.laz: no point is of class 6 (there are 2): give footprints by --reference" in message
 
 
 def test_an_image_from_points_without_colour(refused):
@@ -639,11 +639,11 @@ def test_an_area_of_another_place(files, refused):
         (["points.laz", "--building-id", "id"], "give --reference"),
         (["points.laz", "ortho.tif", "--gsd", "0"], "--gsd must be from 0.01 to 100 m, not 0"),
         (["points.laz", "--extent", "5", "5", "1", "9"], "must be xmin ymin xmax ymax"),
-        (["points.laz", "--extent", "0", "0", "9", "9"], "--extent covers x 0.0 to 9.0"),
+        (["points.laz", "--extent", "0", "0", "9", "9"], "the extent asked for covers x 0.0 to 9.0"),
         (["points.laz", "--ground-filter", "magic"], "--ground-filter must be opening or cloth, not 'magic'"),
         (["points.laz", "--dem", "dem.tif", "--ground-filter", "cloth"], "--dem or --ground-filter, not both"),
         (["points.laz", "--points", "p*.laz"], "points.laz is given twice"),
-        (["ortho.tif", "--gsd", "0.01", "--extent", "0", "0", "9", "9"], "--extent covers"),
+        (["ortho.tif", "--gsd", "0.01", "--extent", "0", "0", "9", "9"], "the extent asked for covers"),
         (["points.laz", "--bands", "red,green,blue"], "give --ortho"),
         (["points.laz", "--name", ""], "--name must not be empty"),
         (["points.laz", "--crs", "EPSG:4326"], "name a projected one"),
@@ -676,7 +676,7 @@ def test_a_stray_point_far_away(files, refused):
     cloud.x[0], cloud.y[0] = WEST + 80_000, SOUTH + 70_000
     write_points(cloud, files / "stray.laz", crs=CRS)
     message = refused("stray.laz")
-    assert "would have 70,000 x 80,000 cells of 1 m: cut it with --extent, or choose larger cells" in message
+    assert "would have 70,000 x 80,000 cells of 1 m: cut it by --extent, or choose larger cells" in message
 
 
 # Windows and chunks
