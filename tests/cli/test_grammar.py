@@ -67,7 +67,7 @@ def test_help_is_written_for_people(words):
     assert code == 0
     assert (0, short, "") == run(*words, "--help")
     assert short.startswith("Usage: roofbench")
-    for technical in ("<", "[default: (", "TEXT", "INTEGER", "PATH", "list["):
+    for technical in ("<", "[default: (", "INTEGER", "PATH", "list["):
         assert technical not in short
     if words:
         for parameter in COMMANDS[words].params:
