@@ -342,8 +342,14 @@ def _mend(
     return geometries[kept], tuple(repairs), kept
 
 
-def polygonal_part(geometry: shapely.Geometry) -> shapely.Geometry:
+def polygonal_part(geometry: shapely.Geometry, *, grid_size: float | None = None) -> shapely.Geometry:
     """Return what has area in a geometry; an empty multipolygon where nothing has.
+
+    Parameters
+    ----------
+    geometry : shapely.Geometry
+    grid_size : float, optional
+        Grid of the coordinates, m, for results of overlays on a grid.
 
     Examples
     --------
@@ -353,4 +359,4 @@ def polygonal_part(geometry: shapely.Geometry) -> shapely.Geometry:
     """
     parts = shapely.get_parts(shapely.get_parts(geometry))
     polygons = parts[shapely.get_type_id(parts) == 3]
-    return shapely.union_all(polygons) if len(polygons) else shapely.MultiPolygon()
+    return shapely.union_all(polygons, grid_size=grid_size) if len(polygons) else shapely.MultiPolygon()
