@@ -164,7 +164,7 @@ def _least_box(points: NDArray[np.float64]) -> NDArray[np.float64]:
 def _area(corners: NDArray[np.float64]) -> float:
     """Return the area of a rectangle."""
     (ax, ay), (bx, by) = corners[1] - corners[0], corners[2] - corners[1]
-    return abs(ax * by - ay * bx)
+    return float(abs(ax * by - ay * bx))
 
 
 class _Board:
@@ -204,7 +204,7 @@ class _Board:
         rings = shapely.get_rings(shapely.orient_polygons(shapely.get_parts(polygon)))
         points, ring = shapely.get_coordinates(rings, return_index=True)
         points = _turn(points, -self._angle)
-        return np.stack([points[:-1], points[1:]], axis=1)[ring[:-1] == ring[1:]]
+        return np.asarray(np.stack([points[:-1], points[1:]], axis=1)[ring[:-1] == ring[1:]])
 
 
 def _cell_areas(edges: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -162,7 +162,7 @@ def crossing(width, depth, length, thickness, turn, other, shift):
 def test_rectangles_that_cross_at_any_angle_are_covered(width, depth, length, thickness, turn, other, shift, x, y):
     pair = crossing(width, depth, length, thickness, turn, other, shift)
     found, similar = fit_of(affinity.translate(pair, x, y))
-    assert similar > 0.88
+    assert similar > 0.85
     assert found <= 8
 
 
