@@ -1,4 +1,4 @@
-"""What a detector may return: the checks between a detector and everything that believes it."""
+"""Checks of the footprints that a detector returns, before anything uses them."""
 
 from __future__ import annotations
 
@@ -15,15 +15,20 @@ from ..scenes.scene import Scene
 
 __all__ = ["checked_output"]
 
-#: How far beyond the extent a detection may reach, metres: a roof cut by the border is often completed.
+#: Largest distance of a detection beyond the extent, metres: roofs cut by the border are often completed.
 _REACH = 50.0
 
 
 def checked_output(detected: Any, scene: Scene, detector: str) -> Footprints:
-    """Return the detector's footprints in the scene's CRS, or raise `InputError` that says what is wrong with them.
+    """Return the detector's footprints in the scene's CRS.
 
-    They must be `Footprints` of valid, non-empty, finite polygons, in the scene's CRS (none is taken as the scene's),
-    inside the extent or at most 50 m beyond it.
+    Footprints without a CRS get that of the scene.
+
+    Raises
+    ------
+    InputError
+        Not `Footprints` of valid, non-empty, finite polygons in the scene's CRS, inside its extent or at most 50 m
+        beyond it.
     """
     if not isinstance(detected, Footprints):
         raise InputError(f"{detector} returned {type(detected).__name__}, not Footprints: build them by Footprints.of")
@@ -32,8 +37,8 @@ def checked_output(detected: Any, scene: Scene, detector: str) -> Footprints:
     wrong = np.flatnonzero(~np.isin(kinds, (3, 6)) | shapely.is_empty(polygons))
     if len(wrong):
         raise InputError(
-            f"{detector} returned {len(wrong)} footprints that are no polygons or empty, the first is number "
-            f"{wrong[0]}: build them by Footprints.of, which reports such"
+            f"{detector} returned {len(wrong)} footprints that are empty or no polygons, the first is number "
+            f"{wrong[0]}: build them by Footprints.of, which reports and drops such"
         )
     wrong = np.flatnonzero(~np.isfinite(shapely.bounds(polygons)).all(axis=-1))
     if len(wrong):
@@ -43,7 +48,7 @@ def checked_output(detected: Any, scene: Scene, detector: str) -> Footprints:
         reason = shapely.is_valid_reason(polygons[wrong[0]])
         raise InputError(
             f"{detector} returned {len(wrong)} invalid polygons, the first is number {wrong[0]} ({reason}): "
-            "build them by Footprints.of, which mends them"
+            "build them by Footprints.of, which repairs them"
         )
     if detected.crs is not None and scene.crs is not None and not same_crs(detected.crs, scene.crs):
         raise InputError(

@@ -1,4 +1,4 @@
-"""The detectors that can be named: built in, installed (entry points ``roofbench.detectors``) or from a file."""
+"""The detectors by name: built in, installed (entry points ``roofbench.detectors``) or from a file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Adjustment: turning lines parallel or perpendicular to a reference line.
+"""Adjustment: rotate lines until they are parallel or perpendicular to a reference line.
 
 The *rotation* of a line towards a reference is the smallest angle that makes both parallel or perpendicular, in
-(-45, 45] degrees. All rotations are taken between the directions as fitted, so the result does not depend on the order.
+(-45, 45] degrees. All rotations use the directions as fitted, so the result does not depend on the order.
 Sources: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.2 (references in the neighbourhood); Awrangjeb, Zhang &
 Fraser (2011), section 3.3 (the longest line of the same black shape).
 """
@@ -48,7 +48,7 @@ def _nearest_rotations(
             turn = rotation_between(angles[j], angles[i])
             if abs(turn) <= tolerance and not abs(turn) >= abs(rotation[j]):
                 rotation[j] = turn
-        # The longest line of a neighbourhood is its own reference.
+        # The longest line of a neighbourhood stays when another line is adjusted to it.
         if longer_only and math.isnan(rotation[i]):
             for other in range(place + 1, n):
                 j = order[other]
@@ -77,9 +77,9 @@ def adjust_to_neighbours(
     tolerance : float
         Largest rotation, radians.
     longer_only : bool
-        Whether only longer lines are references; else every line is one for every other.
+        Whether only longer lines are references; otherwise each line is a reference for all others.
     share : float
-        Share of the lines, the longest first, that are references at all.
+        Share of the lines, the longest first, that can be references.
     """
     references = math.ceil(share * len(lines))
     rotation: NDArray[np.float64] = _nearest_rotations(
@@ -98,9 +98,9 @@ def adjust_to_shape(
     tolerance : float
         Largest rotation, radians.
     longest_only : bool
-        Whether the longest line of a shape is its only base, as printed; else a line that no base is near enough to
-        becomes the next one, because a shape often joins buildings and trees that stand at other angles. A further base
-        to which no line is turned is dropped.
+        Whether the longest line of a shape is its only base line, as printed. Otherwise a line that cannot be adjusted
+        to any base line becomes a further one, because a shape often joins buildings and trees at different angles. A
+        further base line to which no other line is adjusted is dropped.
     """
     rotation = np.full(len(lines), np.nan)
     bases: dict[int, list[int]] = {}
@@ -124,7 +124,7 @@ def adjust_to_shape(
 
 
 def rotate(lines: Boxes, rotation: NDArray[np.float64]) -> Boxes:
-    """Return the lines turned about their centres, which must be their origins."""
+    """Return the lines rotated about their origins, which must be their centres."""
     turned = lines.copy()
     cos, sin = np.cos(rotation), np.sin(rotation)
     turned[:, UX] = lines[:, UX] * cos - lines[:, UY] * sin

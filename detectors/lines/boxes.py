@@ -1,4 +1,4 @@
-"""Boxes: lines and rectangles in one form, and what a raster holds inside them.
+"""Boxes: lines and rectangles in one form, and sums of rasters inside them.
 
 Nouns
 -----
@@ -8,11 +8,11 @@ pixel coordinates
 box
     Eight numbers: origin (`OX`, `OY`), unit direction (`UX`, `UY`) and the intervals [`U0`, `U1`) along that direction
     and [`V0`, `V1`) across it, pixels. *Across* is the direction turned by +90 degrees in pixel coordinates,
-    ``(-UY, UX)``; lines are directed so that the building lies across. A line is a box without width (``V0 = V1 = 0``),
-    and to extend a side of a rectangle is to move one end of one interval.
+    ``(-UY, UX)``; lines are directed so that the building lies on that side. A line is a box without width
+    (``V0 = V1 = 0``). To extend a side of a rectangle, one end of one interval is moved.
 row prefix sums
     Of a raster of shape (rows, columns): shape (rows, columns + 1), entry (r, c) is the sum of the first c cells of
-    row r. The sum over a turned box is then one subtraction per row that it crosses.
+    row r. The sum over a rotated box takes one subtraction per row that it crosses.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def row_range(box: NDArray[np.float64]) -> tuple[int, int]:
 
 @kernel
 def _slab(slope: float, low: float, high: float, x0: float, x1: float) -> tuple[float, float]:
-    """Cut the interval [x0, x1) to where ``low <= slope * x < high``."""
+    """Return the part of the interval [x0, x1) where ``low <= slope * x < high``."""
     if abs(slope) < 1e-12:
         return (x0, x1) if low <= 0.0 < high else (0.0, 0.0)
     at_low, at_high = low / slope, high / slope
@@ -132,7 +132,7 @@ def column_range(box: NDArray[np.float64], row: int) -> tuple[int, int]:
 
 @kernel
 def sum_in_box(prefix: NDArray[np.int32], box: NDArray[np.float64]) -> tuple[int, int, int]:
-    """Return the sum over the cells whose centre is in the box, the number of them on the raster, and in all."""
+    """Return the sum over the cells whose centre is in the box, their number on the raster, and their total number."""
     rows, columns = prefix.shape[0], prefix.shape[1] - 1
     first_row, last_row = row_range(box)
     total, on_raster, in_all = 0, 0, 0

@@ -1,4 +1,4 @@
-"""Dominant colours of a rectangle: which values of Y, I and Q its roof has.
+"""Dominant colours of a rectangle: the ranges of Y, I and Q that its roof has.
 
 Nouns
 -----
@@ -6,11 +6,11 @@ YIQ
     Intensity Y in [0, 1], hue I in [-0.5957, 0.5957] and saturation Q in [-0.5226, 0.5226] of a colour (NTSC), as the
     paper names them; their histograms have 10, 20 and 20 bins.
 part
-    Run of histogram bins around one peak, from minimum to minimum; a minimum belongs to the part on its left.
+    Run of histogram bins around one peak, from minimum to minimum; a minimum belongs to the part to its left.
 range
-    The bins of a part that hold at least 97 % of it, taken from its peak outwards, the larger neighbour first.
+    The bins that contain at least 97 % of a part, from its peak outwards, the larger neighbour first.
 dominant
-    The ranges of the largest parts, until these parts hold 90 % of the rectangle. Their union is a lookup table.
+    The ranges of the largest parts, until these parts contain 90 % of the rectangle. Their union is a lookup table.
 
 Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.4.1.
 """

@@ -10,9 +10,9 @@ curve
 curves
     Several curves in one array: curve i is ``points[offsets[i]:offsets[i + 1]]``.
 
-The paper runs the Canny detector on the binary mask and links edges; tracing the contour gives the same pixels, already
-in order and labelled by shape. Points are resampled to the paper's pixel, 0.15 m, so that every length counted in curve
-points means the same at any ground sampling distance. Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.1.
+The paper runs the Canny detector on the binary mask and links the edges; tracing the contour gives the same pixels, in
+order and labelled by shape. Points are resampled to the paper's pixel of 0.15 m by default, so that lengths in curve
+points do not depend on the ground sampling distance. Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.1.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Curves:
 def _resample(
     points: NDArray[np.float64], offsets: NDArray[np.int64], spacing: float, closed: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Place points evenly along each polyline, about `spacing` apart."""
+    """Return points placed evenly along each polyline, about `spacing` apart, and the offsets of the curves."""
     curves = len(offsets) - 1
     distance = np.zeros(len(points) + curves)
     counts = np.zeros(curves + 1, dtype=np.int64)
@@ -104,7 +104,18 @@ def sample_curves(
     closed: bool,
     spacing: float,
 ) -> Curves:
-    """Resample packed polylines of pixel coordinates to even spacing (pixels)."""
+    """Resample polylines to even spacing.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        All polylines in one array, pixel coordinates.
+    offsets : ndarray of int64, shape (curves + 1,)
+    shapes : ndarray of int64, shape (curves,)
+    closed : bool
+    spacing : float
+        Distance of successive points, pixels.
+    """
     sampled, sampled_offsets = _resample(points, offsets, spacing, closed)
     return Curves(sampled, sampled_offsets, shapes, closed, spacing)
 
@@ -112,8 +123,8 @@ def sample_curves(
 def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float, sample: float = SAMPLE) -> Curves:
     """Trace the closed outlines of the black shapes that are at least `shortest` metres long.
 
-    Points lie at the centres of the black pixels along the border, so half a pixel inside the true edge. Travelling
-    along a curve, black lies across (see `boxes`), for outer and inner outlines alike.
+    Points are the centres of the black pixels along the border, half a pixel inside the true edge. Along a curve, black
+    lies across (see `boxes`), for outer and inner outlines alike.
     """
     found, hierarchy = cv2.findContours(black, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     polylines: list[NDArray[np.float64]] = []
@@ -137,7 +148,7 @@ def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float, sampl
 def _convolve(
     points: NDArray[np.float64], offsets: NDArray[np.int64], kernel: NDArray[np.float64], closed: bool
 ) -> NDArray[np.float64]:
-    """Convolve each curve with an odd kernel; closed curves wrap around, open ones are turned about their ends."""
+    """Convolve each curve with an odd kernel; closed curves wrap around, open ones are mirrored at their ends."""
     out = np.zeros_like(points)
     reach = len(kernel) // 2
     for i in range(len(offsets) - 1):

@@ -3,16 +3,16 @@
 Nouns
 -----
 chord
-    Straight line between two points of a curve that are L curve points apart.
+    Straight line between two points of a curve, L curve points apart.
 accumulated distance
-    h_L(k) = | sum of the signed distances of point k from the chords of length L that slide over it |: large where the
-    curve turns, and much less noisy than curvature by derivatives.
+    h_L(k) = | sum of the signed distances of point k from all chords of length L that span it |: large where the curve
+    turns, and less noisy than the curvature from derivatives.
 candidate
     Local maximum, along a curve, of the squared displacement between two smoothings (sigma 4 and 3).
 
 A candidate is a corner when the product of its accumulated distances for three chord lengths, each divided by its
-maximum along the curve, exceeds a threshold, and when the curve turns there by enough. Source: Awrangjeb, Lu, Fraser &
-Ravanbakhsh (2009), the corner detector that the 2010 paper names in section 3.3.1.
+maximum along the curve, exceeds a threshold, and when the angle of the curve there is not nearly straight. Source:
+Awrangjeb, Lu, Fraser & Ravanbakhsh (2009), the corner detector that the 2010 paper names in section 3.3.1.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ __all__ = ["CHORDS", "find_corners"]
 
 #: Chord lengths, curve points.
 CHORDS = (10, 20, 30)
-#: How much wider the second smoothing is that candidates are found by, curve points.
+#: Difference of the two smoothings that candidates come from, curve points.
 _WIDER = 1.0
 
 
 @kernel
 def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -> NDArray[np.float64]:
-    """Return h_L(k) for every point of one curve, shape (n,); chords that leave an open curve are left out."""
+    """Return h_L(k) for every point of one curve, shape (n,); chords beyond the end of an open curve do not exist."""
     n = len(curve)
     out = np.zeros(n)
     for start in range(n if closed else n - chord):
@@ -52,7 +52,7 @@ def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -
 
 @kernel
 def _turn(curve: NDArray[np.float64], before: int, at: int, after: int) -> float:
-    """Return the angle by which the path before -> at -> after turns, degrees, 0 = straight on."""
+    """Return the angle by which the path before -> at -> after turns, degrees; 0 is straight."""
     ax, ay = curve[at, 0] - curve[before, 0], curve[at, 1] - curve[before, 1]
     bx, by = curve[after, 0] - curve[at, 0], curve[after, 1] - curve[at, 1]
     return abs(math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by)))
@@ -60,7 +60,7 @@ def _turn(curve: NDArray[np.float64], before: int, at: int, after: int) -> float
 
 @kernel
 def _neighbours(corners: list[int], i: int, n: int, arm: int, closed: bool) -> tuple[int, int]:
-    """Return the points that the angle of corner i is measured to: the corners beside it, or `arm` points away."""
+    """Return the two points that define the angle at corner i: its neighbouring corners, or points `arm` away."""
     at = corners[i]
     if closed:
         if len(corners) >= 3:
@@ -102,7 +102,7 @@ def corners_of_curve(
             is_peak = 0 < k < n - 1 and moved[k] > moved[k - 1] and moved[k] >= moved[k + 1]
         if is_peak and strength[k] > product:
             corners.append(k)
-    # The flattest corner goes first, because its going changes the angles of its neighbours.
+    # The flattest corner is removed first, because that changes the angles of its neighbours.
     while len(corners) > 0:
         flattest, flattest_turn = -1, least_turn
         for i in range(len(corners)):

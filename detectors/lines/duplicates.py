@@ -1,13 +1,13 @@
-"""Duplicates: turned rectangles that see again what larger ones have seen.
+"""Duplicates: rectangles at an oblique angle to larger ones that cover them.
 
-Two rectangles are *turned* against each other when they are neither parallel nor perpendicular. The parts of an L, T, U
-or C shaped building adjoin at right angles, so their overlap is *natural*; that of turned rectangles is not. The *new
-share* of a rectangle is the share of its area that lies in none of the larger rectangles against which it is turned; a
-*duplicate* has next to none: it adds little more than the corners by which it is turned.
+Two rectangles are *oblique* when they are neither parallel nor perpendicular. The parts of an L, T, U or C shaped
+building adjoin at right angles, so their overlap is natural; that of oblique rectangles is not. The *new share* of a
+rectangle is the share of its area outside all larger rectangles that are oblique to it. A *duplicate* has a new share
+near zero: it adds little more than its corners.
 
-The 2010 paper (section 3.4) joins "perpendicular" parts, finds it "hard to decide which overlap is unexpected and which
-is natural", and drops an initial rectangle that is "completely within" a final one. A rectangle that a short jagged
-line made lies across the sides of the one before it and so is never completely within it.
+The 2010 paper (section 3.4) joins perpendicular parts, leaves open how natural and other overlaps are separated, and
+drops an initial rectangle that lies completely inside a final one. A rectangle from a short jagged line crosses the
+sides of the earlier rectangle and is never completely inside it.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, Boxes, box_centres, lengths, 
 
 __all__ = ["find_duplicates"]
 
-#: Points of the lattice that a rectangle is sampled on, along each side.
+#: Lattice points along each side of a rectangle.
 _LATTICE = 32
 
 
 @kernel
 def new_share(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
-    """Return the share of a box's area that lies in none of the others, from a lattice in its own coordinates."""
+    """Return the share of a box's area outside all others, sampled on a lattice in its own coordinates."""
     new = 0
     for i in range(_LATTICE):
         along = box[U0] + (i + 0.5) * (box[U1] - box[U0]) / _LATTICE
@@ -55,7 +55,7 @@ def _find(
     tolerance: float,
 ) -> NDArray[np.bool_]:
     duplicates = np.zeros(len(boxes), dtype=np.bool_)
-    turned = np.empty_like(boxes)
+    oblique = np.empty_like(boxes)
     for place in range(len(order)):
         i = order[place]
         found = 0
@@ -64,19 +64,19 @@ def _find(
             if duplicates[j] or dx * dx + dy * dy >= reach * reach:
                 continue
             if abs(rotation_between(directions[i], directions[j])) > tolerance:
-                turned[found] = boxes[j]
+                oblique[found] = boxes[j]
                 found += 1
-        duplicates[i] = found > 0 and new_share(boxes[i], turned[:found]) < least
+        duplicates[i] = found > 0 and new_share(boxes[i], oblique[:found]) < least
     return duplicates
 
 
 def find_duplicates(boxes: Boxes, *, least: float, tolerance: float) -> NDArray[np.bool_]:
-    """Tell which rectangles are duplicates of larger ones that are none, shape (n,).
+    """Return which rectangles are duplicates of larger ones that are no duplicates themselves, shape (n,).
 
     Parameters
     ----------
     least : float
-        Least new share of a rectangle that is no duplicate.
+        Smallest new share of a rectangle that is no duplicate.
     tolerance : float
         Largest angle between rectangles that count as parallel or perpendicular, radians.
     """

@@ -1,8 +1,8 @@
-"""Local entropy: how many different grey values a small window holds.
+"""Local entropy: how varied the grey values of a small window are.
 
-Of the histogram of the 9 x 9 cells around a cell, in 256 grey levels, H = -sum p log2 p, divided by log2(81), its
-largest possible value, and scaled to 0..255. Windows are cut at the border of the image.
-Source: Awrangjeb, Zhang & Fraser (2011), section 3.2, which prints neither window nor levels.
+H = -sum p log2 p over the histogram of the 9 x 9 cells around a cell in 256 grey levels, divided by its largest
+possible value log2(81) and scaled to 0..255. Windows are cut at the border of the image. Source: Awrangjeb, Zhang &
+Fraser (2011), section 3.2, which prints neither window nor levels.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def grey_levels(image: Image) -> NDArray[np.uint8]:
 def local_entropy(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return the normalised local entropy, 0..255, shape (rows, columns).
 
-    The histogram slides along each row; sum(c log2 c) over its counts is kept up to date, so a cell costs one column of
-    the window in and one out.
+    The histogram slides along each row and sum(c log2 c) over its counts is updated, so each cell costs one column of
+    the window that enters and one that leaves.
     """
     rows, columns = grey.shape
     reach = WINDOW // 2
@@ -62,7 +62,7 @@ def local_entropy(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
         total = np.float32(0.0)
         for column in range(-reach, columns):
             entering, leaving = column + reach, column - reach - 1
-            # Out before in: with both columns held, a count could pass the end of the table.
+            # First out, then in: with both columns inside, a count could exceed the table.
             if leaving >= 0:
                 for r in range(top, bottom):
                     level = grey[r, leaving]

@@ -1,13 +1,12 @@
-"""Extension: growing a side of a box step by step while what it grows over looks like a building.
+"""Extension: move a side of a box outwards step by step while the added area looks like a building.
 
-The *strip* is what a step would add. The paper extends a line by a rectangle 3 m along and 3 m deep, and a side "by the
-same technique": a strip is cut along its side into equal *parts* of that length or more, and passes when each part is
-more than 70 % black in the primary mask and no vegetation. Tested as a whole, a strip passes over a court that takes up
-less than 30 % of the side, and the rectangle of one wing covers the next.
-A step starts at 3 m; when it fails it is halved; below the point spacing the side stands.
-*Vegetation* is a mean index above the threshold and, where texture is used, a mean entropy above its threshold too.
-Sources: Awrangjeb, Ravanbakhsh & Fraser (2010), sections 3.3.2 and 3.3.3; entropy beside the index: Awrangjeb, Zhang &
-Fraser (2011), section 3.2.
+A *strip* is the area that a step adds. The paper extends a line by a rectangle 3 m along and 3 m deep, and the side of
+a rectangle by the same technique: a strip is divided along its side into equal *parts* of at least that length, and
+passes when each part is more than 70 % black in the primary mask and not vegetation. Tested as a whole, a strip would
+pass over a court of less than 30 % of the side, and the rectangle of one wing would cover the next. The first step is 3
+m; a step that fails is halved; the extension ends below the point spacing. *Vegetation* has a mean index above the
+threshold and, where texture is used, a mean entropy above its threshold, too. Sources: Awrangjeb, Ravanbakhsh & Fraser
+(2010), sections 3.3.2 and 3.3.3; entropy beside the index: Awrangjeb, Zhang & Fraser (2011), section 3.2.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ __all__ = ["Cover", "Growth", "band", "extend_lines", "extend_rectangle", "last_
 
 
 class Cover(NamedTuple):
-    """Row prefix sums of what decides whether a place can be part of a building.
+    """Row prefix sums of the rasters that decide whether an area can be part of a building.
 
     Attributes
     ----------
@@ -47,7 +46,7 @@ class Growth(NamedTuple):
     Attributes
     ----------
     step, least_step : float
-        First step, and the step below which the side stands.
+        First step, and the step below which the extension ends.
     black_share : float
         Least share of black cells in a part of a strip; cells beyond the raster count as white.
     part : float
@@ -65,7 +64,7 @@ class Growth(NamedTuple):
 
 
 def last_step(rules: Growth) -> float:
-    """Return the smallest step that a side tries, pixels: it ends at most so far short of the black's end."""
+    """Return the smallest step that is tried, pixels; a side ends at most that far before the end of the black area."""
     step = rules.step
     while step / 2 >= rules.least_step:
         step /= 2

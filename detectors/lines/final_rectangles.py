@@ -1,12 +1,12 @@
-"""Final rectangles: initial ones, shrunk and then extended over what has the colour of their roof.
+"""Final rectangles: initial ones, shrunk and then extended over areas with the colours of their roof.
 
 Nouns
 -----
 strip
-    What a step would add to a side: as long as the side, 0.35 m wide. It is sampled on a lattice in its own
-    coordinates, at least one row and one sample per pixel, because it may be thinner than a pixel.
+    Area that a step adds to a side: as long as the side, 0.35 m wide. It is sampled on a lattice in its own
+    coordinates, at least one row and one sample per pixel, because it may be narrower than a pixel.
 rise
-    More black in the primary mask than in the strip before: the side may be growing over a neighbour.
+    More black in the primary mask than in the strip before: the side may extend over a neighbour.
 
 A strip passes when more than 40 % of it is in range in each of Y, I and Q, more than 90 % is black in the secondary
 mask, and the primary black does not rise. A rise after the primary black fell below 10 % ends the side; any other
@@ -28,7 +28,7 @@ from .colours import Colours, dominant_ranges, yiq_bins
 
 __all__ = ["DROPPED", "FinalRules", "final_rectangles", "shrink"]
 
-#: Index of an initial rectangle that lay wholly inside a final one.
+#: Index for an initial rectangle that lies wholly inside a final one.
 DROPPED = -1
 
 
@@ -38,15 +38,15 @@ class FinalRules(NamedTuple):
     Attributes
     ----------
     reduction : float
-        Share by which length and width shrink first.
+        Share by which length and width are reduced at first.
     part_share, total_share : float
         Of the dominant colours (see `colours`).
     strip, least_strip : float
-        First width of a strip, and the width below which the side stands.
+        First width of a strip, and the width below which the extension ends.
     colour_share, black_share : float
         Least shares in range (each of Y, I, Q) and black in the secondary mask.
     gap_share : float
-        Primary black below which the next rise ends the side.
+        Primary black below which the next rise ends the extension of the side.
     rise : float
         Largest increase of primary black that does not count as a rise.
     whole_initial : bool
@@ -67,7 +67,7 @@ class FinalRules(NamedTuple):
 
 @kernel
 def shrink(box: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """Return a box with length and width less by `share`, about the same centre."""
+    """Return a box with the same centre whose length and width are reduced by a share."""
     out = box.copy()
     along, across = share * (box[U1] - box[U0]) / 2, share * (box[V1] - box[V0]) / 2
     out[U0] += along

@@ -3,12 +3,12 @@
 Nouns
 -----
 chain
-    Edge pixels in order, followed from an end as straight on as possible; a branch is a chain of its own.
+    Edge pixels in order, followed from an end as straight as possible; a branch is a separate chain.
 image line
     Line fitted to a piece of a chain between corners, like the lines around black shapes.
 
-Canny's upper threshold follows the image, 70 % of whose cells have a smaller gradient, but is at least that of a step
-of some grey levels, so that the noise of a plain scene makes no edges; the lower threshold is 0.4 of it.
+Canny's upper threshold is the gradient that 70 % of the cells do not reach, but at least that of a step of some grey
+levels, so that noise in a uniform image makes no edges; the lower threshold is 0.4 of it.
 Source: Awrangjeb, Zhang & Fraser (2011), sections 3.3 and 3.4, which print no edge detector parameters.
 """
 
@@ -32,7 +32,7 @@ __all__ = ["ImageEdges", "extract_edges"]
 #: Share of the cells whose gradient is below Canny's upper threshold, and its lower threshold as a share of the upper.
 _QUIET_SHARE = 0.7
 _LOWER = 0.4
-#: Variance of the smoothing that the Sobel filter itself does along the gradient, square pixels.
+#: Variance of the smoothing by the Sobel filter along the gradient, square pixels.
 _SOBEL_VARIANCE = 0.7
 _NEIGHBOURS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1)])
 
@@ -59,7 +59,7 @@ class ImageEdges:
 def edge_pixels(grey: NDArray[np.uint8], blur: float, contrast: float) -> NDArray[np.uint8]:
     """Return Canny's edge map of a grey image blurred with sigma `blur` pixels, 1 = edge.
 
-    `contrast` is the least step in grey levels that starts an edge.
+    `contrast` is the smallest step in grey levels that starts an edge.
     """
     smooth = cv2.GaussianBlur(grey, (0, 0), blur) if blur > 0 else grey
     dx, dy = cv2.Sobel(smooth, cv2.CV_16S, 1, 0), cv2.Sobel(smooth, cv2.CV_16S, 0, 1)
@@ -73,7 +73,7 @@ def edge_pixels(grey: NDArray[np.uint8], blur: float, contrast: float) -> NDArra
 
 @kernel
 def _next_pixel(edges: NDArray[np.uint8], row: int, column: int, from_row: int, from_column: int) -> int:
-    """Return which neighbour continues a chain straightest from (from_row, from_column), -1 without any unused one."""
+    """Return the unused neighbour that continues a chain from (from_row, from_column) straightest; -1 for none."""
     rows, columns = edges.shape
     best, best_score = -1, -1e9
     back_row, back_column = row - from_row, column - from_column

@@ -1,4 +1,4 @@
-"""The detector `improved`: the line detector with texture, which tells buildings from trees of their height and colour.
+"""The detector `improved`: the line detector with texture, to separate buildings from trees of similar colour.
 
 Source: Awrangjeb, Zhang & Fraser, "Automatic building detection in complex scenes: improved detector using texture",
 IAPRS XXXVIII-3/W22 (2011). The page docs/results/line-detectors.md lists how each open point of the print is read and
@@ -43,26 +43,30 @@ class Improved(LineDetector):
     )  # fmt: skip
     entropy_threshold: float = parameter(
         0.7, minimum=0, maximum=1, swept=(0.3, 0.6, 0.65, 0.7, 0.75, 0.8),
-        doc="mean local entropy, as a share of the largest possible one, above which green is a tree; printed 0.3",
+        doc="mean local entropy, as a share of its largest value, above which green areas are trees; 0.3 as printed",
         source="2011, 3.2; reading",
     )  # fmt: skip
     vegetation_side: str = parameter(
         "either", choices=("either", "inside"),
-        doc="side of a line on which vegetation makes it a tree edge", source="2011, 3.2; 2010, 3.3.1",
+        doc="side of a line that is tested for vegetation", source="2011, 3.2; 2010, 3.3.1",
     )  # fmt: skip
     adjustment: str = parameter(
         "bases", choices=("bases", "longest", "neighbours", "none"),
-        doc="what lines are turned to: the longest line of their black shape, beyond its reach the next longest; the "
-        "longest alone, as printed; any line within 50 m; nothing",
+        doc="reference of the adjustment: the longest line of the shape and, for lines at other angles, the next ones; "
+        "the longest alone, as printed; any line within 50 m; none",
         source="2011, 3.3; reading",
     )  # fmt: skip
-    voting: bool = parameter(True, doc="whether lines are voted on; optional in the print", source="2011, 3.3")
+    voting: bool = parameter(
+        True, doc="whether lines need a majority of votes; optional in the print", source="2011, 3.3"
+    )
     vote_length: str = parameter(
         "relative", choices=("relative", "printed"),
         doc="vote v1 of a line shorter than the mean: L/mean, or the printed (mean-L)/mean",
         source="2011, 3.3; reading",
     )  # fmt: skip
-    majority: float = parameter(0.5, minimum=0, maximum=1, doc="mean vote that a line must exceed", source="2011, 3.3")
+    majority: float = parameter(
+        0.5, minimum=0, maximum=1, doc="mean vote above which a line is kept", source="2011, 3.3"
+    )
     texture: bool = parameter(
         True,
         doc="whether candidates are tested by edge orientation histograms; optional in the print",
@@ -76,22 +80,22 @@ class Improved(LineDetector):
         source="2011, 3.4; reading",
     )
     edge_contrast: float = parameter(
-        20.0, unit="grey levels", minimum=0, doc="least step in brightness that starts an image edge",
+        20.0, unit="grey levels", minimum=0, doc="smallest step in brightness that starts an image edge",
         source="2011, 3.4; reading",
     )  # fmt: skip
     texture_margin: float = parameter(
-        1.0, unit="m", minimum=0, doc="how far outside a candidate image edges still count as its own",
+        1.0, unit="m", minimum=0, doc="distance outside a candidate up to which image edges belong to it",
         source="2011, 3.4; reading",
     )  # fmt: skip
     most_edges: float = parameter(
-        90.0, unit="m", minimum=0, doc="most length of edges in a building (tests 2 and 5)", source="2011, 3.4"
+        90.0, unit="m", minimum=0, doc="largest total length of edges in a building (tests 2 and 5)", source="2011, 3.4"
     )
     area_per_edge: float = parameter(
         4.5, unit="m", minimum=0, doc="least area per length of edges (test 6); 45 px of 0.1 m", source="2011, 3.4"
     )
     peak_ratio: float = parameter(
         2.0, minimum=0, swept=(1.0, 1.5, 2.0, 2.5),
-        doc="how many times as high as the mean a peak of tests 1 and 3 is; printed: well above it",
+        doc="least ratio of a peak of tests 1 and 3 to the mean bin; printed: well above it",
         source="2011, 3.4; reading",
     )  # fmt: skip
 

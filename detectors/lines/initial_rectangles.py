@@ -1,7 +1,7 @@
-"""Initial rectangles: where buildings are, grown from the longest lines first.
+"""Initial rectangles: extended from the lines, the longest first.
 
-A line is *already inside* a rectangle when its midpoint and at least nine tenths of its length are, within what the
-rectangle's extension may have ended short; it makes no rectangle of its own.
+A line is *already inside* a rectangle when its midpoint and at least nine tenths of its length are, with a margin for
+the last step of the extension; it makes no rectangle.
 Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.3.
 """
 
@@ -16,7 +16,7 @@ from .extension import Cover, Growth, extend_rectangle
 
 __all__ = ["INSIDE", "TOO_NARROW", "initial_rectangles"]
 
-#: What became of a line that made no rectangle (a rectangle's index is 0 or more).
+#: Codes of lines that made no rectangle; indices of rectangles are 0 or more.
 INSIDE = -1
 TOO_NARROW = -2
 
@@ -47,7 +47,7 @@ def initial_rectangles(
     margin: float,
     inside_share: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Grow a rectangle from each line that is not yet inside one.
+    """Return a rectangle extended from each line that is not yet inside one.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def initial_rectangles(
     least_side : float
         A rectangle with a shorter side is dropped, pixels.
     margin : float
-        How far outside a rectangle a line still counts as inside, pixels: an extension ends up to a step short.
+        Distance outside a rectangle up to which a line counts as inside, pixels: an extension may end a step early.
     inside_share : float
         Share of its length by which a line whose midpoint is inside counts as inside.
 

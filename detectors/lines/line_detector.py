@@ -1,7 +1,7 @@
-"""What both line detectors share: their parameters, the rasters they read, and the steps before and after the lines.
+"""The parameters and steps that both line detectors share.
 
 Parameters that a paper prints in pixels of its images are declared in those (`PAPER_PIXEL`, 0.15 m) or in metres, never
-in pixels of the scene at hand, so that the same values serve any ground sampling distance.
+in pixels of the scene, so that the values do not depend on the ground sampling distance.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .extension import Cover, Growth, extend_lines, last_step
 from .final_rectangles import FinalRules, final_rectangles
 from .initial_rectangles import INSIDE, TOO_NARROW, initial_rectangles
 from .line_steps import line_steps
-from .masks import build_masks, ground_heights, pulse_spacing, sunken
+from .masks import build_masks, ground_correction, ground_heights, pulse_spacing
 from .rasters import Rasters
 from .segments import Segments, beyond_coverage, fit_segments, inside_first
 from .trace import Adjusted, Outcome, Trace, Votes
@@ -48,12 +48,12 @@ PAPER_PIXEL = 0.15
 _OUTSET = 0.5
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
 _CURVE_STEP = 0.3
-#: Least length of a side that is tested at a time, point spacings: a first step then holds ten points or more.
+#: Least length of a part of a side that is tested, point spacings: its first step then contains ten points or more.
 _EXTENSION_PART = 3.5
-#: Root mean square distance from its line at which a segment must have missed a corner: point spacings, and pixels,
-#: whose staircase is no corner.
+#: Root mean square distance from its line above which a segment contains a missed corner: in point spacings, and in
+#: pixels, because the staircase of a mask is no corner.
 _MISSED_CORNER, _STAIRCASE = 0.4, 0.5
-#: Threshold that no mean reaches: entropy is not used.
+#: Raster that stands for unused entropy.
 _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
 
 
@@ -71,26 +71,26 @@ class LineDetector(Detector):
     )
     below_ground: float = parameter(
         0.1, minimum=0, maximum=1, swept=(0.05, 0.1, 0.2, 1.0),
-        doc="largest share of the points around that may lie below the DEM under them before it is lowered "
+        doc="largest share of the surrounding points that may lie below the ground before it is lowered "
         "(`ground=point-dem`); 1 never lowers it, as printed",
         source="2011, 3.1; reading",
     )  # fmt: skip
     tile_size: float = parameter(
         450, unit="px of 0.15 m", minimum=20, swept=(400, 450, 500, 550, 600),
-        doc="side of the tiles that a ground height is estimated for", source="2010, 3.2 and 4.4.1",
+        doc="side of the tiles with one ground height each", source="2010, 3.2 and 4.4.1",
     )  # fmt: skip
     height: float = parameter(
         2.5, unit="m", minimum=0, doc="least height above ground of a building", source="2010, 3.2"
     )
     marking: str = parameter(
         "nearest", choices=("nearest", "squares"),
-        doc="what a place in the masks is: what the nearest point is, or the printed square around each point",
+        doc="how points mark the masks: the nearest point decides, or each point marks a square, as printed",
         source="2010, 3.2; reading",
     )  # fmt: skip
     neighbourhood: float | None = parameter(
         None, unit="m", minimum=0,
-        doc="side of the square that a point marks, and how far off the nearest one counts; none: 1.5 point spacings, "
-        "the paper's 5 px of 0.15 m",
+        doc="side of the square that a point marks, and largest distance of the nearest point; none: 1.5 point "
+        "spacings, the paper's 5 px of 0.15 m",
         source="2010, 3.2",
     )  # fmt: skip
     minimum_side: float = parameter(
@@ -102,7 +102,7 @@ class LineDetector(Detector):
     )
     curve_step: float | None = parameter(
         None, unit="m", minimum=0.01,
-        doc="distance of curve points; none: 0.3 point spacings, a third of a pixel or more",
+        doc="distance of curve points; none: 0.3 point spacings, at least a third of a pixel",
         source="2010, 3.3.1: pixels of 0.15 m at a spacing of 0.5 m; reading",
     )  # fmt: skip
     corner_product: float = parameter(
@@ -111,13 +111,13 @@ class LineDetector(Detector):
     )  # fmt: skip
     corner_angle: float = parameter(
         157.0, unit="deg", minimum=90, maximum=180,
-        doc="interior angles from this to its explement (203) are no corner", source="CPDA, 2009",
+        doc="interior angles from this value to 360 minus it (203) are no corner", source="CPDA, 2009",
     )  # fmt: skip
     missed_corner: float | None = parameter(
         None, unit="m", minimum=0.01,
-        doc="RMS distance of a curve from its line above which it is split; none: 0.4 point spacings, half a pixel "
-        "or more",
-        source="not in the print; 1000 is none",
+        doc="RMS distance of a curve from its line above which it is split; none: 0.4 point spacings, at least half a "
+        "pixel; 1000 never splits, as printed",
+        source="reading",
     )  # fmt: skip
     inside_reach: float = parameter(
         3.0,
@@ -133,10 +133,10 @@ class LineDetector(Detector):
     )  # fmt: skip
     vegetation_threshold: float = parameter(
         48.0, minimum=0, maximum=255, swept=(32, 40, 48, 56, 64),
-        doc="mean vegetation index (0..255) above which a place is vegetation", source="2010, 3.3.1 and 4.4.1",
+        doc="mean vegetation index (0..255) above which an area is vegetation", source="2010, 3.3.1 and 4.4.1",
     )  # fmt: skip
     band_width: float = parameter(
-        3.0, unit="m", minimum=0.1, doc="width of the rectangle beside a line whose vegetation index is tested",
+        3.0, unit="m", minimum=0.1, doc="width of the rectangle beside a line in which the vegetation index is tested",
         source="2010, 3.3.1",
     )  # fmt: skip
     adjustment_angle: float = parameter(
@@ -144,7 +144,7 @@ class LineDetector(Detector):
         source="2010, 3.3.2",
     )  # fmt: skip
     adjustment_radius: float = parameter(
-        50.0, unit="m", minimum=0, doc="largest distance of a line and its reference when turned to neighbours",
+        50.0, unit="m", minimum=0, doc="largest distance of a line and its reference in the adjustment to neighbours",
         source="2010, 3.3.2",
     )  # fmt: skip
     extension: float = parameter(
@@ -153,7 +153,7 @@ class LineDetector(Detector):
     )  # fmt: skip
     extension_stop: float | None = parameter(
         None, unit="m", minimum=0.01,
-        doc="step below which a line or initial rectangle stands; none: 0.8 point spacings",
+        doc="step below which the extension of a line or initial rectangle ends; none: 0.8 point spacings",
         source="2010, 3.3.2: 0.4 m at a spacing of 0.5 m",
     )  # fmt: skip
     extension_black: float = parameter(
@@ -162,7 +162,7 @@ class LineDetector(Detector):
     )  # fmt: skip
     extension_part: float | None = parameter(
         None, unit="m", minimum=0.1,
-        doc="least length of a side that is tested at a time; none: the first step, 3.5 point spacings or more; 1000: "
+        doc="least length of a part of a side that is tested; none: the first step, at least 3.5 point spacings; 1000: "
         "the whole side",
         source="2010, 3.3.2: 3 m, and 3.3.3: the same technique for sides; reading",
     )  # fmt: skip
@@ -171,11 +171,13 @@ class LineDetector(Detector):
     )
     inside_margin: float | None = parameter(
         None, unit="m", minimum=0,
-        doc="how far outside a rectangle a line counts as in it; none: last step of its extension + a pixel; printed 0",
+        doc="distance outside a rectangle up to which a line counts as inside; none: last step of its extension and one "
+        "pixel; 0 as printed",
         source="2010, 3.3.3; reading",
     )  # fmt: skip
     inside_share: float = parameter(
-        0.9, minimum=0, maximum=1, doc="share of its length by which a line whose midpoint is in a rectangle is in it",
+        0.9, minimum=0, maximum=1,
+        doc="least share of its length inside a rectangle for a line to count as inside, with its midpoint",
         source="2010, 3.3.3; reading",
     )  # fmt: skip
     reduction: float = parameter(
@@ -186,11 +188,11 @@ class LineDetector(Detector):
         0.97,
         minimum=0,
         maximum=1,
-        doc="share of a part of a colour histogram that its range holds",
+        doc="least share of a part of a colour histogram in its range",
         source="2010, 3.4.1",
     )
     total_share: float = parameter(
-        0.90, minimum=0, maximum=1, doc="share of the rectangle that the parts used hold", source="2010, 3.4.1"
+        0.90, minimum=0, maximum=1, doc="least share of the rectangle in the parts used", source="2010, 3.4.1"
     )
     strip: float = parameter(
         0.35, unit="m", minimum=0.01, doc="first step of the final extension", source="2010, 3.4.2"
@@ -204,26 +206,30 @@ class LineDetector(Detector):
         doc="least share of a step that is black in the secondary mask", source="2010, 3.4.2 and 4.4.1",
     )  # fmt: skip
     gap_share: float = parameter(
-        0.1, minimum=0, maximum=1, doc="primary black below which the next rise ends a side", source="2010, 3.4.2"
+        0.1,
+        minimum=0,
+        maximum=1,
+        doc="primary black below which the next rise ends the extension of a side",
+        source="2010, 3.4.2",
     )
     rise: float = parameter(
-        0.1, minimum=0, maximum=1, doc="largest increase of primary black that is no rise; the print has none",
+        0.1, minimum=0, maximum=1, doc="largest increase of primary black that is no rise; 0 as printed",
         source="2010, 3.4.2; reading",
     )  # fmt: skip
     compare: str = parameter(
         "shrunk", choices=("shrunk", "whole"),
-        doc="size of an initial rectangle in the test that drops it when it lies wholly inside a final one",
+        doc="size of an initial rectangle in the test that drops it wholly inside a final one",
         source="2010, 3.4; reading",
     )  # fmt: skip
     new_share: float = parameter(
         0.1, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
-        doc="least share of a final rectangle outside the larger ones against which it is turned; with less it is the "
-        "same building seen again; 0 keeps all, as printed",
+        doc="least share of a final rectangle outside the larger ones at an oblique angle to it; with less it is a "
+        "duplicate; 0 keeps all, as printed",
         source="2010, 3.4: parts adjoin at right angles; reading",
     )  # fmt: skip
     parallel_angle: float = parameter(
         3.0, unit="deg", minimum=0, maximum=45,
-        doc="largest angle between final rectangles that count as parallel or perpendicular",
+        doc="largest angle between final rectangles that are parallel or perpendicular",
         source="2010, 3.4; reading",
     )  # fmt: skip
 
@@ -305,7 +311,7 @@ class LineDetector(Detector):
         return self.run(self._rasters(scene))
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
-        """Return the rectangles of the buildings; overlapping ones are parts of one building, or one seen twice."""
+        """Return the rectangles of the buildings; overlapping ones are parts of one building, or duplicates."""
         found = self.trace(scene)
         corners = box_corners(found.final)
         x, y = found.grid.to_world(corners[..., 1], corners[..., 0])
@@ -326,7 +332,7 @@ class LineDetector(Detector):
         surface = None if self.ground == "tile-mode" or not len(points) else scene.heights.ground
         ground = ground_heights(points, surface, method=self.ground, tile_side=tile_side)
         if self.ground == "point-dem" and self.below_ground < 1 and len(points):
-            ground += sunken(points, ground, self.below_ground)
+            ground += ground_correction(points, ground, self.below_ground)
         masks = build_masks(
             points,
             ground + self.height,

@@ -1,24 +1,24 @@
-"""The two building masks: where the laser sees no ground, and where it sees something high.
+"""The two building masks: areas without ground points, and areas with high points.
 
 Nouns
 -----
 height threshold
     Ground height + 2.5 m, one value per point.
 primary mask
-    Black where no point below the threshold lies near: the void areas. Its black shapes are where buildings may be.
+    Black where no point below the threshold is near: void areas. Its black shapes are possible buildings.
 secondary mask
-    Black near points above the threshold: the filled areas. It bounds how far a building may be extended.
-sunken ground
-    Where the DEM runs above what the laser saw: a DEM is interpolated below buildings and crowns, and on a slope it
-    cuts through the pad that a house stands on.
+    Black near points above the threshold: filled areas. It limits the extension of a building.
+raised ground
+    Where the DEM is above the laser points: it is interpolated below buildings and crowns, and on a slope it cuts
+    through the levelled ground of a house.
 neighbourhood
     Side of the square that a point marks; it follows the point spacing (5 x 5 pixels of 0.15 m for points 0.5 m apart).
 nearest point
-    Of all points that are not at the threshold itself. Squares of low points reach into the roofs beside them by as
-    much as the points happen to lie near the wall; where the nearest point decides, the border between ground and roof
-    is half-way between a low and a high point, on average where it is.
+    Nearest of all points that are not exactly at the threshold. Squares around low points reach into adjacent roofs, by
+    more the nearer the points are to the wall. Where the nearest point decides, the border between ground and roof is
+    half-way between a low and a high point, which is unbiased.
 coverage
-    Where there are points at all, voids filled up to the size of a large roof or pond.
+    Where there are points, with voids up to the size of a large roof or pond filled.
 
 Masks are uint8 rasters on the grid of the orthoimage, 1 = black. Source: Awrangjeb, Ravanbakhsh & Fraser (2010),
 section 3.2; ground height per point: Awrangjeb, Zhang & Fraser (2011), section 3.1; mode of the tile: the conference
@@ -38,17 +38,17 @@ from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
 
-__all__ = ["Masks", "build_masks", "ground_heights", "pulse_spacing", "sunken"]
+__all__ = ["Masks", "build_masks", "ground_heights", "pulse_spacing", "ground_correction"]
 
 #: Side of the cells in which points are counted to tell coverage and density, metres.
 _COVERAGE_CELL = 2.5
 #: A gap in the points narrower than this is a void inside the coverage, metres.
 _WIDEST_VOID = 50.0
 #: Side of the cells in which points below the ground are counted, metres: with their neighbours they span a house.
-_SUNKEN_CELL = 4.0
-#: Farther from any high point than so many neighbourhoods, a void is no roof: water and wet asphalt give no returns.
+_CORRECTION_CELL = 4.0
+#: A void farther than this many neighbourhoods from any high point is no roof: water and wet asphalt give no returns.
 _BARE = 4.0
-#: Rows of the masks that are made at a time: distances take eight times the memory of a mask.
+#: Rows of the masks that are computed at a time: distances take eight times the memory of a mask.
 _BAND = 512
 #: Distance between successive bins of the height histogram of a tile (conference version), metres.
 _HEIGHT_BIN = 2.0
@@ -107,7 +107,7 @@ def _coverage(points: PointCloud, grid: Grid) -> NDArray[np.uint8]:
 
 
 def _tiles(x: NDArray[np.float64], y: NDArray[np.float64], side: float) -> NDArray[np.int64]:
-    """Return a number per tile of a fixed global raster, so that it does not depend on where the scene is cut."""
+    """Return the number of each point's tile in a global raster that does not depend on the extent of the scene."""
     return np.floor(x / side).astype(np.int64) * (1 << 32) + np.floor(y / side).astype(np.int64)
 
 
@@ -155,19 +155,19 @@ def ground_heights(
     return _tile_dem(points, ground, tile_side) if method == "tile-dem" else ground.sample(points.x, points.y)
 
 
-def sunken(points: PointCloud, ground: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """Return by how much the ground is to be lowered at each point, metres, shape (n,): zero or less.
+def ground_correction(points: PointCloud, ground: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    """Return the correction of raised ground at each point, metres, shape (n,): zero or less.
 
-    In cells of 4 m, no more than `share` of the points may lie below the ground: the ground of a cell sinks by the
-    most that it or one of its eight neighbours asks for, because a house hides the ground that it stands on. Between
-    the centres of cells the step is interpolated.
+    In cells of 4 m, at most `share` of the points may lie below the ground. The correction of a cell is the largest that
+    it or one of its eight neighbours needs, because a house hides the ground below it. Between the centres of cells the
+    correction is interpolated.
     """
     above = points.z - ground
     known = np.isfinite(above)
     if not known.any():
         return np.zeros(len(points))
     x, y = points.x[known], points.y[known]
-    grid = Grid.covering((x.min() - _SUNKEN_CELL, y.min() - _SUNKEN_CELL, x.max(), y.max()), _SUNKEN_CELL)
+    grid = Grid.covering((x.min() - _CORRECTION_CELL, y.min() - _CORRECTION_CELL, x.max(), y.max()), _CORRECTION_CELL)
     cell = grid.cells(x, y)[0]
     ordered = above[known][np.lexsort((above[known], cell))]
     count = np.bincount(cell, minlength=grid.rows * grid.columns)
@@ -191,10 +191,10 @@ def _squares(hits: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
 def _nearest(
     low: NDArray[np.uint8], high: NDArray[np.uint8], reach: float
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return where the nearest point is low and where it is high, no farther than `reach` pixels; a tie is low.
+    """Return where the nearest point is low and where it is high, up to `reach` pixels away; a tie is low.
 
-    Where the nearest high point is farther than `_BARE` times that, it is low at any distance. Distances are those of
-    cv2's 5 x 5 chamfer mask, within 2 % of the exact ones.
+    Where the nearest high point is farther than `_BARE` times that, the place is low at any distance. Distances are those
+    of cv2's 5 x 5 chamfer mask, within 2 % of the exact ones.
     """
     is_low, is_high = np.empty_like(low), np.empty_like(high)
     halo = math.ceil(_BARE * reach) + 1
@@ -222,9 +222,9 @@ def build_masks(
     neighbourhood : float
         Side of the square that a point marks, metres.
     nearest : bool
-        Whether the primary mask is white where the nearest point is low or nothing high is near, and the secondary mask
-        also black where the nearest is high, no farther than `neighbourhood`; else both are made of squares alone, as
-        printed.
+        Whether the nearest point decides: the primary mask is white where it is low or no high point is near, and the
+        secondary mask is black also where it is high, up to `neighbourhood` away. Otherwise both masks are made of
+        squares, as printed.
     """
     side = 2 * max(0, round((neighbourhood / grid.gsd - 1) / 2)) + 1
     coverage = _coverage(points, grid)

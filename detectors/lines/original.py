@@ -1,4 +1,4 @@
-"""The detector `original`: lines around the laser's voids, extended by colour.
+"""The detector `original`: rectangles from lines around areas without ground points, extended by colour.
 
 Source: Awrangjeb, Ravanbakhsh & Fraser, "Automatic detection of residential buildings using LIDAR data and
 multispectral imagery", ISPRS Journal of Photogrammetry and Remote Sensing 65 (2010). The page
@@ -32,12 +32,12 @@ class Original(LineDetector):
 
     adjustment_reference: str = parameter(
         "longer", choices=("longer", "any"),
-        doc="which lines a line is turned to: longer ones, for which the print sorts them by length, or any near it",
+        doc="reference lines of the adjustment: longer ones (the print sorts by length), or all nearby ones",
         source="2010, 3.3.2; reading",
     )  # fmt: skip
     adjustment_share: float = parameter(
         0.5, minimum=0, maximum=1,
-        doc="share of the lines, the longest first, that others are turned to; optional in the print, 1 is all",
+        doc="share of the lines, the longest first, that can be references; optional in the print, 1 is all",
         source="2010, 3.3.2",
     )  # fmt: skip
 

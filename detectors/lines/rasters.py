@@ -1,4 +1,4 @@
-"""What the steps of the line detectors read of a scene, all on the grid of its orthoimage."""
+"""The rasters that the steps of the line detectors use, all on the grid of the orthoimage."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Rasters"]
 
 @dataclass(frozen=True, eq=False)
 class Rasters:
-    """What the steps read of a scene.
+    """The rasters of a scene.
 
     Attributes
     ----------

@@ -1,9 +1,9 @@
 """Segments: the straight pieces of curves between corners, as fitted lines.
 
 A *segment* is all curve points between two corners (of an open curve also between a corner and an end); its *line* is
-the total least-squares line through them, cut at the projections of the first and last point before smoothing. Lines
-are boxes without width (see `boxes`), directed so that black lies across: the inside point P_in of the paper is three
-pixels to that side.
+the total least-squares line through them, which ends at the projections of the first and last point before smoothing.
+Lines are boxes without width (see `boxes`), directed so that black lies across: the inside point P_in of the paper is
+three pixels to that side.
 Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.1.
 """
 
@@ -177,9 +177,7 @@ def fit_segments(
     shortest: float,
     deviation: float = math.inf,
 ) -> Segments:
-    """Fit a line to each piece between corners.
-
-    A closed curve with fewer than two corners has no straight piece.
+    """Return a line fitted to each piece between corners; a closed curve with fewer than two corners has none.
 
     Parameters
     ----------
@@ -188,10 +186,10 @@ def fit_segments(
     corners, corner_offsets
         As `find_corners` returns them.
     shortest : float
-        Shorter lines are left out, pixels.
+        Shorter lines are dropped, pixels.
     deviation : float
-        A piece whose root mean square distance from its line is larger has a corner that was missed, and is split where
-        it is farthest from its chord, pixels.
+        Largest root mean square distance of a piece from its line, pixels. A piece above it contains a missed corner
+        and is split where it is farthest from its chord.
     """
     lines, owner = _fit_all(
         points, curves.points, curves.offsets, curves.closed, corners, corner_offsets, shortest, deviation
@@ -200,11 +198,11 @@ def fit_segments(
 
 
 def inside_first(lines: Boxes, black: NDArray[np.uint8], *, reach: float, outset: float) -> Boxes:
-    """Turn lines whose black side is the other one; move each `outset` pixels away from the black and both its ends.
+    """Return the lines directed so that black lies across, moved and lengthened by `outset` pixels.
 
-    The black side is where the point `reach` pixels from the middle is black; where both points are alike, the
-    direction of travel along the contour stands. Contour points are centres of black pixels, so the edge of the mask is
-    half a pixel further out, at its corners in both directions.
+    The black side is where the point `reach` pixels from the middle is black; where both points are equal, the direction
+    along the contour is kept. Contour points are centres of black pixels, so the edge of the mask is half a pixel
+    farther out, at its corners in both directions.
     """
     rows, columns = black.shape
 

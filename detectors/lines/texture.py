@@ -1,14 +1,14 @@
-"""Edge orientation histograms of candidate rectangles, and the six tests that tell buildings from trees by them.
+"""Edge orientation histograms of candidate rectangles, and the six tests that separate buildings from trees.
 
 Nouns
 -----
 H_col
-    Collective histogram: length of image edges inside a rectangle by direction of their tangent, 5 degree bins; the
-    first and the last bin, both at +-90 degrees, are one, so there are 35 (bin 0 is the merged one). Metres.
+    Collective histogram: length of the image edges inside a rectangle by direction of their tangent, metres. Bins of 5
+    degrees; the first and the last one, both at +-90 degrees, are merged into bin 0, so there are 35.
 H_ind
     The same of a single edge.
 peak
-    Circular local maximum of a multiple of the mean bin: a significant peak is "well above the mean bin height".
+    Circular local maximum above a multiple of the mean bin; the print asks for "well above the mean bin height".
 
 A candidate is a building when any test holds (L_min = 3 m): T1 two peaks of 3 L_min and less than 2 L_min on average in
 the bins between them; T2 a bin of 3 L_min and at most 90 m in all; T3 two peaks of 2 L_min and a highest bin of 3 times
@@ -36,7 +36,7 @@ __all__ = ["BIN_COUNT", "Texture", "TextureRules", "apply_tests", "histograms_of
 
 #: Bins of 5 degrees in 180, the outer two merged.
 BIN_COUNT = 35
-#: Side of the squares that edge points are sorted into, pixels.
+#: Side of the square cells that edge points are sorted into, pixels.
 _CELL = 64
 
 
@@ -186,7 +186,7 @@ def histograms_of(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return H_col (k, 35) and the highest bin of any H_ind (k,) of each box, metres.
 
-    `points` are the smoothed points of the curves, `shape` the rows and columns of the image. A curve point stands for
+    `points` are the smoothed points of the curves, `shape` the rows and columns of the image. Each curve point represents
     `SAMPLE` metres of edge.
     """
     rows, columns = math.ceil(shape[0] / _CELL), math.ceil(shape[1] / _CELL)
@@ -200,7 +200,7 @@ def histograms_of(
 
 
 def find_peaks(histogram: NDArray[np.float64], ratio: float) -> NDArray[np.intp]:
-    """Return the circular local maxima that are higher than `ratio` times the mean; of a plateau, its first bin."""
+    """Return the circular local maxima above `ratio` times the mean; for a plateau, its first bin."""
     rising = histogram > np.roll(histogram, 1)
     high = np.flatnonzero(rising & (histogram > ratio * histogram.mean()))
     return np.asarray([k for k in high if _falls_after(histogram, int(k))], np.intp)

@@ -1,9 +1,9 @@
-"""Voting: whether the lines around one black shape agree that each of them is a building edge.
+"""Voting: lines around one black shape that agree in length and direction are building edges.
 
 Four votes from 0 to 1 for each extended line l of a shape: v1 its length against the mean length of the shape's lines;
 v2 = (Theta - theta) / Theta for the angle theta by which it was adjusted; v3 = n_e / n_t, the share of the shape's
-lines that were still there after extension; v4 = 1 when the longest image line within a rectangle 3 m wide around l is
-at least 2 L_min long, (L - L_min) / L_min when shorter, 0 without one. A line stays when their mean exceeds 0.5.
+lines that remain after extension; v4 = 1 when the longest image line within a rectangle 3 m wide around l is at least
+2 L_min long, (L - L_min) / L_min when shorter, 0 without one. A line is kept when their mean exceeds 0.5.
 Source: Awrangjeb, Zhang & Fraser (2011), section 3.3.
 """
 
@@ -40,7 +40,7 @@ def _longest(
 
 
 def longest_image_lines(lines: Boxes, image_lines: Boxes, *, half_width: float) -> NDArray[np.float64]:
-    """Return the length of the longest image line, as far as it lies within `half_width` of each line; 0 without one.
+    """Return the length of the longest image line within `half_width` of each line; 0 without one.
 
     All lengths in pixels; the origins of the image lines are their midpoints.
     """
@@ -73,13 +73,13 @@ def cast_votes(
     shapes : ndarray of int64, shape (n,)
         Of all extracted lines.
     surviving : ndarray of bool, shape (n,)
-        Which of them are left after the extension.
+        Which of them remain after the extension.
     tolerance : float
         Theta, the largest adjustment, radians.
     least : float
         L_min, metres.
     length_as_printed : bool
-        For a line shorter than the mean, v1 = (mean - L) / mean, so that a shorter line votes higher; else L / mean.
+        Whether v1 of a line shorter than the mean is (mean - L) / mean, which favours shorter lines, and not L / mean.
     """
     _, shape = np.unique(shapes, return_inverse=True)
     extracted = np.bincount(shape)

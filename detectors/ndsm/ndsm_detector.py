@@ -1,15 +1,14 @@
-"""The plain baseline: what is high, not a tree, and large enough, is a building.
+"""The plain baseline: high, large objects that do not look like trees are buildings.
 
 1. Points are gathered on a grid as fine as their spacing allows; heights are those of the scene (`Scene.heights`).
 2. A cell is *high* where at least half of its points are above the height threshold.
-3. Each cue that the scene offers (multiple returns, roughness, penetration, image vegetation) says between -1 (roof)
-   and +1 (tree) how a cell looks; the mean is averaged over the neighbourhood, and a high cell where it is negative is
-   *roof*.
-4. Small holes are filled, and an opening with a disc cuts off what is narrow.
-5. The outline is traced to a fraction of a cell, small or tree-like footprints go, and the rest gets straight walls
-   along its main directions, or is replaced by its minimum-area rectangle.
+3. Each available cue (multiple returns, roughness, penetration, image vegetation) rates a cell from -1 (roof) to +1
+   (tree). The mean is averaged over the neighbourhood; high cells with a negative mean are *roof*.
+4. Small holes are filled, and an opening with a disc removes narrow parts.
+5. The outline is traced to a fraction of a cell. Small or tree-like footprints are dropped; the others get straight
+   walls along their main directions, or are replaced by their minimum-area rectangle.
 
-Nothing is learned and nothing is random: the same points give the same footprints.
+The detector has no training and no random numbers: the same points give the same footprints.
 """
 
 from __future__ import annotations
@@ -43,8 +42,8 @@ __all__ = ["NDSM"]
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
 
-#: Name of the image's cue, and its weight besides the laser's, which weigh 1: roofs may be green, autumn trees are
-#: not, and roofs lean in the image.
+#: Name of the cue from the image, and its weight against 1 for each cue from the points: roofs may be green, trees in
+#: autumn are not, and roofs are displaced in the image.
 _IMAGE, _IMAGE_WEIGHT = "image vegetation", 0.5
 
 
@@ -60,7 +59,7 @@ class NDSM(Detector):
         unit="m",
         minimum=0.5,
         maximum=20,
-        doc="height above ground from which on a point is high",
+        doc="least height above ground of a high point",
         source="Awrangjeb 2010, section 3.2",
         swept=(1.5, 2.0, 2.5, 3.0),
     )
@@ -69,14 +68,14 @@ class NDSM(Detector):
     )
     dem: bool = parameter(True, doc="take the ground from the DEM where it is known; false: always from the points")
     multiple_share: float | None = parameter(
-        0.5, minimum=0, maximum=1, doc="share of multiple returns from which on a cell looks like a tree; none: unused"
+        0.5, minimum=0, maximum=1, doc="share of multiple returns above which a cell looks like a tree; none: unused"
     )
     roughness: float | None = parameter(
         0.25,
         unit="m",
         minimum=0.01,
         maximum=5,
-        doc="deviation from a local plane from which on a cell looks like a tree; none: unused",
+        doc="deviation from a local plane above which a cell looks like a tree; none: unused",
     )
     window: float = parameter(
         1.5,
@@ -89,7 +88,7 @@ class NDSM(Detector):
         0.35,
         minimum=0,
         maximum=1,
-        doc="share of points below the height from which on a high cell looks like a tree; none: unused",
+        doc="share of points below the height above which a high cell looks like a tree; none: unused",
     )
     ndvi: float | None = parameter(
         0.15, minimum=-1, maximum=1, doc="(NIR - R) / (NIR + R) of vegetation, with a NIR band; none: unused"
@@ -98,19 +97,19 @@ class NDSM(Detector):
         0.05, minimum=-1, maximum=1, doc="(G - R) / (G + R) of vegetation, without a NIR band; none: unused"
     )
     darkest: float = parameter(
-        0.1, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel say nothing: shadow"
+        0.1, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel are ignored: shadow"
     )
     smoothing: float = parameter(
-        0.75, unit="m", minimum=0, maximum=5, doc="sigma of the Gaussian over which the likeness to a tree is averaged"
+        0.75, unit="m", minimum=0, maximum=5, doc="sigma of the Gaussian that averages the likeness to a tree"
     )
     opening: float = parameter(
-        1.0, unit="m", minimum=0, maximum=10, doc="radius of the opening: narrower parts are cut off"
+        1.0, unit="m", minimum=0, maximum=10, doc="radius of the opening that removes narrow parts"
     )
-    largest_hole: float = parameter(4.0, unit="m2", minimum=0, doc="holes up to this area are filled")
+    largest_hole: float = parameter(4.0, unit="m2", minimum=0, doc="largest hole that is filled")
     most_tree_like: float = parameter(
-        -0.4, minimum=-1, maximum=1, doc="footprints whose cells look more like a tree on average are dropped"
+        -0.4, minimum=-1, maximum=1, doc="mean likeness to a tree above which a footprint is dropped"
     )
-    smallest_area: float = parameter(8.0, unit="m2", minimum=0, doc="smaller footprints are dropped")
+    smallest_area: float = parameter(8.0, unit="m2", minimum=0, doc="least area of a footprint")
     outline: Literal["polygon", "rectangle"] = parameter(
         "polygon",
         choices=("polygon", "rectangle"),
@@ -121,7 +120,7 @@ class NDSM(Detector):
         unit="m",
         minimum=0,
         maximum=5,
-        doc="how far traced points may lie beside a wall; none: one cell, at least 0.5 m",
+        doc="largest distance of traced points from a wall; none: one cell, at least 0.5 m",
     )
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
@@ -137,7 +136,7 @@ class NDSM(Detector):
         scene.require(self.requires)
         scene = scene.for_detection()
         assert scene.points is not None
-        # Three points that are there twice lie in one plane like six of a roof.
+        # Duplicate points would count as evidence for a plane.
         points = scene.points.distinct()
         ground = scene.heights if self.dem else heights_of(scene.points, None, scene.extent)
         heights = ground.above(points)
@@ -170,7 +169,7 @@ class NDSM(Detector):
         return None if index is None or threshold is None else (index, threshold)
 
     def _cue_likeness(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> dict[str, _Floats]:
-        """Return what each cue says of each cell: -1 roof, 0 at its threshold, +1 tree, NaN nothing."""
+        """Return the rating of each cell by each cue: -1 roof, 0 at its threshold, +1 tree, NaN unknown."""
         index, least_index = vegetation or (None, None)
         rules = {
             "multiple returns": (cues.multiple_share, self.multiple_share, 0.25),
@@ -197,7 +196,7 @@ class NDSM(Detector):
         else:
             tolerance = max(cues.grid.gsd, 0.5) if self.tolerance is None else self.tolerance
             polygons = regularise(traced, tolerance)
-        # Where no cue says anything the mean is NaN, and the footprint stays.
+        # Without any cue the mean is NaN and the footprint is kept.
         keep = ~(looks > self.most_tree_like) & (shapely.area(polygons) >= self.smallest_area)
         attributes = {"height": height[keep], "tree_likeness": looks[keep]}
         return Footprints.of(polygons[keep], crs=crs, attributes=attributes, source=self.name)
@@ -216,13 +215,13 @@ def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple
 
 
 def _mean_of(cue_likeness: dict[str, _Floats], shape: tuple[int, int]) -> _Floats:
-    """Return the weighted mean of what the cues say; NaN where none says anything."""
+    """Return the weighted mean of the cues; NaN where all are unknown."""
     total, weights = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
     for name, cue in cue_likeness.items():
         weight = np.float32(_IMAGE_WEIGHT if name == _IMAGE else 1)
-        told = np.isfinite(cue)
-        total += np.where(told, weight * cue, 0)
-        weights += weight * told
+        known = np.isfinite(cue)
+        total += np.where(known, weight * cue, 0)
+        weights += weight * known
     return np.where(weights > 0, total / np.where(weights > 0, weights, 1), np.float32(np.nan))
 
 
@@ -230,12 +229,12 @@ def _averaged(likeness: _Floats, high: _Mask, sigma: float) -> _Floats:
     """Return the Gaussian mean over high cells, unchanged in others; `sigma` in cells."""
     import cv2
 
-    told = high & np.isfinite(likeness)
-    if sigma <= 0 or not told.any():
+    known = high & np.isfinite(likeness)
+    if sigma <= 0 or not known.any():
         return likeness
-    total = cv2.GaussianBlur(np.where(told, likeness, np.float32(0)), (0, 0), sigma)
-    weight = cv2.GaussianBlur(told.astype(np.float32), (0, 0), sigma)
-    return np.where(told, total / np.where(told, weight, 1), likeness)
+    total = cv2.GaussianBlur(np.where(known, likeness, np.float32(0)), (0, 0), sigma)
+    weight = cv2.GaussianBlur(known.astype(np.float32), (0, 0), sigma)
+    return np.where(known, total / np.where(known, weight, 1), likeness)
 
 
 def _means_inside(polygons: NDArray[np.object_], grid: Grid, *rasters: _Floats) -> list[NDArray[np.float64]]:

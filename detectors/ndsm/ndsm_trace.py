@@ -24,9 +24,9 @@ class NDSMTrace:
     ----------
     cues : CellCues
     high : ndarray of bool
-        Cells at least half of whose points are high.
+        Cells where at least half of the points are high.
     cue_likeness : dict of str to ndarray of float32
-        Per cue: -1 roof, +1 tree, NaN nothing.
+        Per cue: -1 roof, +1 tree, NaN unknown.
     likeness : ndarray of float32
         Their mean over the neighbourhood.
     roof, mask : ndarray of bool

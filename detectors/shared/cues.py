@@ -1,21 +1,21 @@
-"""Cues that tell roofs from trees, per cell of a grid.
+"""Cues that separate roofs from trees, per cell of a grid.
 
 Nouns
 -----
 high point
     A point more than the height threshold above the ground.
 high share
-    High points among all points of a cell: the share of the cell that something high covers, and 1 over a roof. Pulses
-    pass through a crown, so its share is lower: the complement is the *penetration*.
+    High points among all points of a cell: the share of the cell that a high object covers, 1 over a roof. Pulses pass
+    through a crown, so its share is lower: the complement is the *penetration*.
 multiple share
     High points whose pulse gave several returns, among the high points around: 0 on a roof, 1 in a crown.
 roughness
-    Standard deviation, metres, of the high points of a window about their plane; each cell takes the smoothest of the
-    windows that hold it, so that ridges, eaves and steps between roofs stay smooth.
+    Standard deviation, metres, of the high points of a window about their plane; each cell has the smallest value of
+    the windows that contain it, so that ridges, eaves and steps between roofs are smooth.
 greenness
     (NIR - R) / (NIR + R), or (G - R) / (G + R) without near infrared; NaN in the dark, where colours are noise.
 
-Axis order (row, column), row 0 northernmost. Cells where a cue says nothing are NaN.
+Axis order (row, column), row 0 northernmost. Cells without a value are NaN.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ __all__ = ["CellCues", "cell_cues", "greenness"]
 
 _Floats = NDArray[np.float32]
 
-#: A cell without points takes the high share of the cells around when these hold at least so many points.
+#: Least number of points in the 3 x 3 cells around a cell without points from which its high share is taken.
 _NEIGHBOURS = 3
-#: A plane through fewer points than this fits by chance.
+#: Least number of points for a plane; fewer fit one by chance.
 _LEAST_POINTS = 6
 #: Least ratio of the spread of the points in two directions (determinant over squared mean of their covariance).
 _FLATTEST = 1e-3
 #: Cells of a strip.
 _STRIP = 1_000_000
-#: Where there is no plane: a deviation that is never the least.
+#: Deviation where there is no plane: larger than any real one.
 _NO_PLANE = np.float32(1e9)
 
 
@@ -59,7 +59,7 @@ class CellCues:
     penetration : ndarray
         1 - high share over 3 x 3 cells.
     multiple_share : ndarray or None
-        Over 3 x 3 cells; None when the points do not tell.
+        Over 3 x 3 cells; None when the points have no number of returns, or one each.
     roughness : ndarray
         Metres; NaN where too few points are high.
     height : ndarray
@@ -78,7 +78,7 @@ class CellCues:
 def cell_cues(
     points: PointCloud, heights: NDArray[np.float32], grid: Grid, *, threshold: float, window: float
 ) -> CellCues:
-    """Gather the cues of points on a grid.
+    """Return the cues of points on a grid.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     image : Image
     grid : Grid
     darkest : float
-        Pixels whose brightest band is below this (0..1) say nothing.
+        Pixels whose brightest band is below this (0..1) are ignored.
     """
     import cv2
 
@@ -138,12 +138,11 @@ def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     bright = np.maximum(more, less)
     if not bright.any():
         return None
-    told = (bright >= darkest) if image.valid is None else (bright >= darkest) & image.valid
-    index = np.where(told, (more - less) / np.maximum(more + less, np.float32(1e-6)), np.float32(0))
-    # Blurred to the cell size before it is sampled at the cell centres: a mean over about one cell, also for cells
-    # smaller than a pixel.
+    usable = (bright >= darkest) if image.valid is None else (bright >= darkest) & image.valid
+    index = np.where(usable, (more - less) / np.maximum(more + less, np.float32(1e-6)), np.float32(0))
+    # Averaging over about one cell before sampling at the cell centres avoids aliasing.
     width = max(1, round(grid.gsd / image.grid.gsd))
-    weight = cv2.blur(told.astype(np.float32), (width, width), borderType=cv2.BORDER_CONSTANT)
+    weight = cv2.blur(usable.astype(np.float32), (width, width), borderType=cv2.BORDER_CONSTANT)
     total = cv2.blur(index, (width, width), borderType=cv2.BORDER_CONSTANT)
     x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)
     _, y = grid.to_world(np.arange(grid.rows) + 0.5, 0)
@@ -161,7 +160,7 @@ def _on_grid(values: NDArray[np.generic], grid: Grid) -> _Floats:
 
 
 def _box(values: _Floats) -> _Floats:
-    """Sum over 3 x 3 cells."""
+    """Return the sums over 3 x 3 cells."""
     import cv2
 
     total: _Floats = cv2.boxFilter(values, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
@@ -206,9 +205,9 @@ def _moments(
 def _smoothest_plane(
     points: PointCloud, index: NDArray[np.intp], chosen: NDArray[np.intp], grid: Grid, width: int
 ) -> _Floats:
-    """Return the least deviation from a plane among the windows of width x width cells that hold a cell.
+    """Return the smallest deviation from a plane among the windows of width x width cells that contain a cell.
 
-    The grid is worked through in strips of rows: ten moments per cell are much more than the points themselves.
+    The grid is processed in strips of rows, because ten moments per cell take more memory than the points.
     """
     import cv2
 
@@ -253,12 +252,12 @@ def _plane_deviation(moments: NDArray[np.float64]) -> NDArray[np.float32]:
             yz = moments[8, row, column] / n - my * mz
             zz = moments[9, row, column] / n - mz * mz
             determinant = xx * yy - xy * xy
-            # Points on one scan line, or on top of each other, determine no plane.
+            # Points on one scan line, or at one place, determine no plane.
             if determinant < max(_FLATTEST * (0.5 * (xx + yy)) ** 2, 1e-8):
                 continue
             a = (xz * yy - yz * xy) / determinant
             b = (yz * xx - xz * xy) / determinant
-            # Raised by its own standard error: the least of several windows must not be one of few points by luck.
+            # Adding the standard error keeps the minimum over windows from favouring windows of few points.
             sigma = np.sqrt(max(zz - a * xz - b * yz, 0.0) * n / (n - 3))
             deviation[row, column] = sigma * (1 + 1 / np.sqrt(2.0 * (n - 3)))
     return deviation

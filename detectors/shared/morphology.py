@@ -1,4 +1,4 @@
-"""Morphology: cleaning of masks on a grid. All lengths are in cells."""
+"""Morphology: opening, closing and filling of masks on a grid. All lengths are in cells."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["closed", "opened", "without_holes"]
 
 _Mask = NDArray[np.bool_]
 
-#: Rows worked on at a time.
+#: Rows processed at a time.
 _BAND = 256
 
 
@@ -25,7 +25,7 @@ def without_holes(mask: _Mask, largest: float) -> _Mask:
 
 
 def closed(mask: _Mask, radius: float) -> _Mask:
-    """Return the mask with what a disc of a radius does not fit into beside it filled."""
+    """Return the morphological closing with a disc of a radius."""
     import cv2
 
     reach = int(radius) + 2
@@ -35,7 +35,7 @@ def closed(mask: _Mask, radius: float) -> _Mask:
 
 
 def opened(mask: _Mask, radius: float) -> _Mask:
-    """Return the mask without what a disc of a radius does not fit into, square corners kept."""
+    """Return the morphological opening with a disc of a radius; square corners are restored."""
     import cv2
 
     solid = mask.astype(np.uint8)
@@ -51,10 +51,10 @@ def _disc(radius: float) -> NDArray[np.uint8]:
 
 
 def _with_corners(opened: NDArray[np.uint8], mask: NDArray[np.uint8], radius: float) -> _Mask:
-    """Return the opened mask with what the mask has within a radius of it, but no region joined to another.
+    """Return the opened mask with the cells of the mask within a radius of it; no two regions are joined.
 
-    A disc of radius r leaves a square corner bare over 0.41 r. Band after band of rows, each with what its windows
-    reach beyond it, so that labels of all cells are held once.
+    Opening with a disc of radius r removes a square corner up to 0.41 r from its vertex. Rows are processed in bands
+    with an overlap, so that only one array of labels is kept.
     """
     import cv2
 

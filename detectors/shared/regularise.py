@@ -1,4 +1,4 @@
-"""Regularise: give traced outlines straight walls and right angles.
+"""Regularisation of traced outlines: straight walls and right angles.
 
 Nouns
 -----
@@ -6,7 +6,7 @@ wall
     A straight part of an outline between two corners: a line fitted to the traced points there. A ring's walls are an
     array of shape (n, 4): centre x and y in metres, direction in radians, length in metres; in order round the ring.
 main directions
-    The few directions, modulo 90 degrees, that most of an outline's length follows.
+    The few directions, modulo 90 degrees, that most of the length of an outline follows.
 
 Coordinates are metres, x east and y north; angles are counted from x towards y.
 """
@@ -26,9 +26,9 @@ __all__ = ["regularise"]
 
 _Points = NDArray[np.float64]
 
-#: Walls within so many degrees follow the same direction; the share of the length that makes it a main one; how many.
+#: Largest angle between walls of one direction (degrees), least share of the length for a main direction, their number.
 _SAME_DIRECTION, _MAIN_SHARE, _MOST_DIRECTIONS = 5.0, 0.15, 4
-#: Neighbouring walls that differ by less (radians) run the same way; by less than the second, meet nowhere near.
+#: Angle of neighbouring walls below which they are parallel, and below which their lines meet too far away (radians).
 _PARALLEL, _GRAZING = math.radians(2), math.radians(10)
 
 
@@ -37,18 +37,17 @@ def regularise(
 ) -> NDArray[np.object_]:
     """Return the polygons with walls along their main directions and right angles between them.
 
-    Each polygon is simplified; its walls are fitted to the traced points between the corners; those within `angle`
-    of a main direction turn into it, and so do walls so short that their direction is noise; neighbouring walls that
-    are parallel become one, or are joined by a step; corners are where neighbouring walls meet. A polygon that comes
-    out invalid, or agrees less than `least_agreement` (intersection over union) with what was traced, is only
-    simplified.
+    Each polygon is simplified and its walls are fitted to the traced points between the corners. Walls within `angle`
+    of a main direction, and short walls whose direction is uncertain, are rotated into it. Parallel neighbouring walls
+    are merged or joined by a step; corners are where neighbouring walls meet. A polygon whose result is invalid, or has
+    an intersection over union below `least_agreement` with the traced one, is only simplified.
 
     Parameters
     ----------
     polygons : ndarray of Polygon, shape (n,)
         As traced, with all their vertices.
     tolerance : float
-        Metres by which traced points may lie beside a wall.
+        Largest distance of traced points from a wall, metres.
     angle : float
         Degrees.
     least_agreement : float
@@ -67,7 +66,7 @@ def regularise(
 
 
 def _regular(traced: Any, simple: Any, tolerance: float, angle: float) -> Any | None:
-    """Return one regularised polygon, or None when its shell does not work out."""
+    """Return one regularised polygon, or None when its exterior ring has fewer than three corners."""
     origin = np.array(traced.bounds[:2])
     sources = [shapely.get_coordinates(ring)[:-1] - origin for ring in (traced.exterior, *traced.interiors)]
     rings = []
@@ -89,8 +88,8 @@ def _regular(traced: Any, simple: Any, tolerance: float, angle: float) -> Any | 
 def _fit_walls(corners: _Points, sources: list[_Points]) -> _Points | None:
     """Return the walls between the corners, fitted to the traced ring that the corners are points of.
 
-    The lines are total least squares, each traced step counting by its length; a wall of few steps joins its corners.
-    None when no ring holds all corners.
+    Total least-squares lines, weighted by the length of each traced step; a wall of few steps joins its corners. None
+    when no ring contains all corners.
     """
     for ring in sources:
         position = _positions(corners, ring)
@@ -102,7 +101,7 @@ def _fit_walls(corners: _Points, sources: list[_Points]) -> _Points | None:
         # The simplified ring runs the other way round.
         ring = ring[::-1]
         position = len(ring) - 1 - position
-    # Start at a corner, so that every wall is one run of steps.
+    # Start at a corner, so that the steps of each wall are contiguous.
     ring = np.roll(ring, -position[0], axis=0)
     start = (position - position[0]) % len(ring)
     step = np.roll(ring, -1, axis=0) - ring
@@ -124,7 +123,7 @@ def _fit_walls(corners: _Points, sources: list[_Points]) -> _Points | None:
 
 
 def _positions(corners: _Points, ring: _Points) -> NDArray[np.intp] | None:
-    """Return at which points of a ring the corners are, or None unless all are there."""
+    """Return the indices of the corners in a ring, or None when one is missing."""
     ring_keys, keys = ring[:, 0] + 1j * ring[:, 1], corners[:, 0] + 1j * corners[:, 1]
     order = np.argsort(ring_keys)
     found = order[np.searchsorted(ring_keys[order], keys).clip(max=len(ring) - 1)]
@@ -132,9 +131,9 @@ def _positions(corners: _Points, ring: _Points) -> NDArray[np.intp] | None:
 
 
 def _main_directions(walls: _Points) -> _Points:
-    """Return the main directions, radians in 0..pi/2, most followed first."""
+    """Return the main directions, radians in 0..pi/2, the most frequent first."""
     degrees = np.degrees(walls[:, 2]) % 90
-    # Long walls tell directions better than short ones of the same length in all.
+    # Long walls determine a direction better than several short ones of the same total length.
     remaining = walls[:, 3] ** 1.5
     least = _MAIN_SHARE * remaining.sum()
     away = (degrees[:, None] - degrees[None, :] + 45) % 90 - 45
@@ -152,7 +151,7 @@ def _main_directions(walls: _Points) -> _Points:
 
 
 def _turned(walls: _Points, mains: _Points, tolerance: float, angle: float) -> _Points:
-    """Return the walls with those near a main direction turned into it."""
+    """Return the walls, with those near a main direction rotated into it."""
     if len(mains) == 0:
         return walls
     quarter = math.pi / 2
@@ -166,13 +165,13 @@ def _turned(walls: _Points, mains: _Points, tolerance: float, angle: float) -> _
 
 
 def _merged(walls: _Points | list[_Points], tolerance: float) -> list[_Points]:
-    """Return the walls with neighbours joined that run the same way, less than the tolerance apart."""
+    """Return the walls with parallel neighbours less than the tolerance apart merged."""
     merged: list[_Points] = []
     for wall in walls:
         merged.append(wall)
         while len(merged) > 1 and _continues(merged[-2], merged[-1], tolerance):
             merged[-2:] = [_joined(merged[-2], merged[-1])]
-    # The first wall may continue the last: where a ring starts is no corner.
+    # The first wall may continue the last one: a ring may start within a wall.
     while len(merged) > 1 and _continues(merged[-1], merged[0], tolerance):
         merged[0] = _joined(merged.pop(), merged[0])
     return merged
@@ -191,7 +190,7 @@ def _joined(one: _Points, two: _Points) -> _Points:
 
 
 def _without_jogs(walls: list[_Points], tolerance: float) -> list[_Points]:
-    """Return the walls without the short ones that only cut a corner, or shift a wall by less than the tolerance."""
+    """Return the walls without short ones that cut a corner or shift a wall by less than the tolerance."""
     kept = list(walls)
     position = 0
     while position < len(kept) and len(kept) > 3:
@@ -204,7 +203,7 @@ def _without_jogs(walls: list[_Points], tolerance: float) -> list[_Points]:
 
 
 def _close_up(before: _Points, after: _Points, wall: _Points, tolerance: float) -> bool:
-    """Return whether the neighbours of a wall run on in each other, or meet beside it close to its line."""
+    """Return whether the neighbours of a wall continue each other, or meet near it."""
     meeting = _meeting(before, after)
     if meeting is None:
         return _continues(before, after, tolerance)
@@ -238,7 +237,7 @@ def _corners(walls: list[_Points], tolerance: float) -> _Points:
         if meeting is not None and math.hypot(*(meeting - between)) < 4 * tolerance:
             corners.append(meeting)
         else:
-            # Parallel walls, or such that meet far off, are joined by a step between them.
+            # Walls that are parallel, or meet far away, are joined by a step.
             corners.append(wall[:2] + along * ((between - wall[:2]) @ along))
             corners.append(following[:2] + onward * ((between - following[:2]) @ onward))
     return np.array(corners)

@@ -28,7 +28,7 @@ def distances(points, chosen: np.ndarray, grid) -> np.ndarray:
     return out
 
 
-def sunken(x: np.ndarray, y: np.ndarray, above: np.ndarray, share: float, cell: float) -> np.ndarray:
+def ground_correction(x: np.ndarray, y: np.ndarray, above: np.ndarray, share: float, cell: float) -> np.ndarray:
     """Step of the ground of each cell [i, j] = [floor(y / cell), floor(x / cell)], by sorting the points of each."""
     rows, columns = int(y.max() // cell) + 1, int(x.max() // cell) + 1
     own = np.zeros((rows, columns))

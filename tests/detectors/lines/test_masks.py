@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from naive import lines as naive_lines
 
-from roofbench.detectors.lines.masks import build_masks, ground_heights, pulse_spacing, sunken
+from roofbench.detectors.lines.masks import build_masks, ground_correction, ground_heights, pulse_spacing
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid
 
@@ -152,7 +152,7 @@ def test_the_ground_sinks_to_a_pad_that_the_elevation_cuts_through():
     points, slope, roof = house_on_a_pad()
     uphill = roof & (points.x > 31)
     assert (points.z > slope + 2.5)[uphill].mean() < 0.2
-    ground = slope + sunken(points, slope, 0.1)
+    ground = slope + ground_correction(points, slope, 0.1)
     assert (points.z > ground + 2.5)[roof].mean() > 0.9
     assert not (points.z > ground + 2.5)[~roof].any()
     far = (abs(points.x - 30) > 20) | (abs(points.y - 30) > 20)
@@ -163,22 +163,22 @@ def test_the_ground_never_rises_and_one_stray_point_does_not_lower_it():
     points = house_on_a_pad()[0]
     level = np.full(len(points), 3.0)
     above = cloud(points.x, points.y, level + 1.0)
-    assert sunken(above, level, 0.1).tolist() == [0.0] * len(points)
+    assert ground_correction(above, level, 0.1).tolist() == [0.0] * len(points)
     stray = above.z.copy()
     stray[1830] = -20.0
-    assert sunken(cloud(points.x, points.y, stray), level, 0.1).tolist() == [0.0] * len(points)
-    assert sunken(above, np.full(len(points), np.nan), 0.1).tolist() == [0.0] * len(points)
+    assert ground_correction(cloud(points.x, points.y, stray), level, 0.1).tolist() == [0.0] * len(points)
+    assert ground_correction(above, np.full(len(points), np.nan), 0.1).tolist() == [0.0] * len(points)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
-def test_no_more_than_the_share_of_the_points_of_a_cell_lie_below_the_sunken_ground(share):
+def test_no_more_than_the_share_of_the_points_of_a_cell_lie_below_the_corrected_ground(share):
     rng = np.random.default_rng(12)
     points = cloud(*rng.uniform(0, 40, (2, 3000)), rng.normal(0, 1, 3000))
-    step = naive_lines.sunken(points.x, points.y, points.z, share, cell=4.0)
+    step = naive_lines.ground_correction(points.x, points.y, points.z, share, cell=4.0)
     centre = cloud(*(np.mgrid[0:9, 0:9].reshape(2, -1) * 4.0 + 4.0 - 2.0), np.zeros(81))
     both = cloud(*(np.concatenate(pair) for pair in ((points.x, centre.x), (points.y, centre.y), (points.z, centre.z))))
     ground = np.zeros(len(both))
     ground[3000:] = np.nan
-    found = sunken(both, ground, share)[3000:]
+    found = ground_correction(both, ground, share)[3000:]
     for x, y, value in zip(centre.x, centre.y, found, strict=True):
         assert value == pytest.approx(step[int(y // 4), int(x // 4)], abs=1e-5)
