@@ -171,7 +171,7 @@ class LineDetector(Detector):
     )
     inside_margin: float | None = parameter(
         None, unit="m", minimum=0,
-        doc="distance outside a rectangle up to which a line counts as inside; none: last step of its extension and one "
+        doc="distance outside a rectangle up to which a line counts as inside; none: last step of its extension + one "
         "pixel; 0 as printed",
         source="2010, 3.3.3; reading",
     )  # fmt: skip

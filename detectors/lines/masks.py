@@ -38,7 +38,7 @@ from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
 
-__all__ = ["Masks", "build_masks", "ground_heights", "pulse_spacing", "ground_correction"]
+__all__ = ["Masks", "build_masks", "ground_correction", "ground_heights", "pulse_spacing"]
 
 #: Side of the cells in which points are counted to tell coverage and density, metres.
 _COVERAGE_CELL = 2.5
@@ -158,9 +158,9 @@ def ground_heights(
 def ground_correction(points: PointCloud, ground: NDArray[np.float64], share: float) -> NDArray[np.float64]:
     """Return the correction of raised ground at each point, metres, shape (n,): zero or less.
 
-    In cells of 4 m, at most `share` of the points may lie below the ground. The correction of a cell is the largest that
-    it or one of its eight neighbours needs, because a house hides the ground below it. Between the centres of cells the
-    correction is interpolated.
+    In cells of 4 m, at most `share` of the points may lie below the ground. The correction of a cell is the largest
+    that it or one of its eight neighbours needs, because a house hides the ground below it. Between the centres of
+    cells the correction is interpolated.
     """
     above = points.z - ground
     known = np.isfinite(above)
@@ -193,8 +193,8 @@ def _nearest(
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return where the nearest point is low and where it is high, up to `reach` pixels away; a tie is low.
 
-    Where the nearest high point is farther than `_BARE` times that, the place is low at any distance. Distances are those
-    of cv2's 5 x 5 chamfer mask, within 2 % of the exact ones.
+    Where the nearest high point is farther than `_BARE` times that, the place is low at any distance. Distances are
+    those of cv2's 5 x 5 chamfer mask, within 2 % of the exact ones.
     """
     is_low, is_high = np.empty_like(low), np.empty_like(high)
     halo = math.ceil(_BARE * reach) + 1

@@ -200,9 +200,9 @@ def fit_segments(
 def inside_first(lines: Boxes, black: NDArray[np.uint8], *, reach: float, outset: float) -> Boxes:
     """Return the lines directed so that black lies across, moved and lengthened by `outset` pixels.
 
-    The black side is where the point `reach` pixels from the middle is black; where both points are equal, the direction
-    along the contour is kept. Contour points are centres of black pixels, so the edge of the mask is half a pixel
-    farther out, at its corners in both directions.
+    The black side is where the point `reach` pixels from the middle is black; where both points are equal, the
+    direction along the contour is kept. Contour points are centres of black pixels, so the edge of the mask is half a
+    pixel farther out, at its corners in both directions.
     """
     rows, columns = black.shape
 

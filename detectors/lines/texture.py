@@ -186,8 +186,8 @@ def histograms_of(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return H_col (k, 35) and the highest bin of any H_ind (k,) of each box, metres.
 
-    `points` are the smoothed points of the curves, `shape` the rows and columns of the image. Each curve point represents
-    `SAMPLE` metres of edge.
+    `points` are the smoothed points of the curves, `shape` the rows and columns of the image. Each curve point
+    represents `SAMPLE` metres of edge.
     """
     rows, columns = math.ceil(shape[0] / _CELL), math.ceil(shape[1] / _CELL)
     corners = box_corners(boxes)

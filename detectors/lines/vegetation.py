@@ -1,11 +1,11 @@
 """Vegetation indices of an orthoimage, scaled to 0..255.
 
 With a near-infrared band the index is NDVI, 255 max(0, (NIR - R) / (NIR + R)). Without one there are two substitutes:
-the paper's *pseudo-NDVI*, which assumes that red, green, blue are infrared, red, green, is (R - G) / (R + G): high on red
-roofs and low on green leaves; *green-red*, 2 (G - R) / (G + R), is high on green leaves. Leaves differ less between green
-and red than between infrared and red (in images with all four bands their NDVI is two to four times (G - R) / (G + R));
-the factor 2 allows one threshold for both.
-Source: Awrangjeb, Ravanbakhsh & Fraser (2010), sections 3.3.1 and 4.3.
+the paper's *pseudo-NDVI*, which assumes that red, green, blue are infrared, red, green, is (R - G) / (R + G): high on
+red roofs and low on green leaves; *green-red*, 2 (G - R) / (G + R), is high on green leaves. Leaves differ less between
+green and red than between infrared and red (in images with all four bands their NDVI is two to four times (G - R) / (G
++ R)); the factor 2 allows one threshold for both. Source: Awrangjeb, Ravanbakhsh & Fraser (2010), sections 3.3.1 and
+4.3.
 """
 
 from __future__ import annotations
