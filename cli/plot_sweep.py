@@ -47,6 +47,7 @@ def plot_sweep(
     from ..benchmark.store.writer import Store
     from ..reports.figures import save_plot
     from ..reports.sensitivity import sensitivity_figure
+    from ..reports.sweep_text import break_down_text
 
     load_plugins(plugin)
     if table is not None:
@@ -70,4 +71,4 @@ def plot_sweep(
     save_plot(sensitivity_figure(lines, level=level), output, dpi=dpi, overwrite=overwrite)
     for line in lines:
         if line.break_down:
-            typer.echo(line.break_down, err=True)
+            typer.echo(break_down_text(line.break_down), err=True)

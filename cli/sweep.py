@@ -76,6 +76,7 @@ def sweep(
     from ..core.output import check_target
     from ..core.registry import split_list
     from ..reports.leaderboard_text import print_unsuccessful
+    from ..reports.sweep_text import break_down_text
 
     execution = options.execution()
     if output is not None:
@@ -103,7 +104,7 @@ def sweep(
     if level is not None:
         first = table[table["evaluator"] == planned.plan.evaluators[0].label]
         for found in break_downs(first, planned.axes, shown, level):
-            typer.echo(str(found))
+            typer.echo(break_down_text(found))
     unsuccessful = unsuccessful_runs(rows)
     print_unsuccessful(unsuccessful, console)
     if any(run.status == "failed" for run in unsuccessful):

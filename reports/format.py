@@ -15,6 +15,7 @@ __all__ = [
     "cell_width",
     "column_title",
     "counted",
+    "index_name",
     "interval_text",
     "listed",
     "number_text",
@@ -92,6 +93,11 @@ def column_title(index: Index, *, words: bool = False) -> str:
     """Return symbol (or title) and unit of an index: ``Q_l %``, ``quality %``."""
     name = index.title if words else index.symbol or index.title
     return f"{name} {unit_text(index.unit)}".strip()
+
+
+def index_name(index: Index) -> str:
+    """Return an index in words with its symbol: ``quality (Q_l)``."""
+    return f"{index.title} ({index.symbol})" if index.symbol else index.title
 
 
 def counted(number: int, noun: str) -> str:

@@ -15,7 +15,8 @@ from .gate_text import gate_summary
 
 __all__ = ["gate_json", "read_gate"]
 
-_NUMBERS = ("baseline", "candidate", "effect", "low", "high", "p")
+_NUMBERS = ("baseline", "candidate", "effect", "low", "high", "p", "seeds_share")
+_COUNTS = ("scenes", "scenes_needed", "undefined")
 
 
 def gate_json(result: GateResult) -> str:
@@ -61,14 +62,14 @@ def read_gate(path: Path) -> GateResult:
 def _conclusion(plain: dict[str, Any]) -> IndexConclusion:
     if plain["conclusion"] not in CONCLUSIONS:
         raise ValueError(f"unknown conclusion {plain['conclusion']!r}")
+    numbers: dict[str, Any] = {name: None if plain[name] is None else float(plain[name]) for name in _NUMBERS}
+    numbers |= {name: int(plain[name]) for name in _COUNTS}
     return IndexConclusion(
         detector=str(plain["detector"]),
         index=_index(str(plain["index"])),
         conclusion=plain["conclusion"],
         margin=float(plain["margin"]),
-        scenes=int(plain["scenes"]),
-        note=str(plain.get("note", "")),
-        **{name: None if plain[name] is None else float(plain[name]) for name in _NUMBERS},
+        **numbers,
     )
 
 

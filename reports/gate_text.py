@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 from ..benchmark.analysis.results import CONCLUSIONS, GateResult, IndexConclusion
-from .format import column_title, interval_text, number_text
+from .format import column_title, counted, interval_text, number_text, value_text
 from .tables import Column, Table, escaped_markdown
 
 __all__ = ["format_gate", "gate_summary"]
 
 _MARKS = dict(zip(CONCLUSIONS, ("🟢", "🔴", "⚪", "🟡", "⚫"), strict=True))
+#: Share of the variance from which on more seeds are worth their time.
+_MOST_SHARE = 0.5
 _COLUMNS = (
     *(Column(title, "left") for title in ("detector", "index", "conclusion")),
     *(Column(title) for title in ("baseline", "candidate", "change", "95 %", "margin", "p", "scenes")),
@@ -29,7 +32,7 @@ def gate_summary(result: GateResult) -> str:
 def format_gate(result: GateResult, form: Literal["table", "md"]) -> str:
     """Return the result as text for a terminal or as Markdown for a pull request."""
     table = Table.of(_COLUMNS, (_row(found, mark=form == "md") for found in result.conclusions))
-    notes = list(dict.fromkeys(found.note for found in result.conclusions if found.note))
+    notes = list(dict.fromkeys(note for found in result.conclusions for note in _notes(found, result.level)))
     how = (
         "Change: mean paired difference over scenes, positive is better; 95 %: its bootstrap interval; p: two-sided, "
         f"Holm over the indices of a detector; level {result.level:g}."
@@ -42,6 +45,21 @@ def format_gate(result: GateResult, form: Literal["table", "md"]) -> str:
         return "\n".join(lines).rstrip()
     failures = (f"failed: {text}" for text in result.failures)
     return "\n".join([sides, table.to_text(), how, *notes, *failures, f"Gate {gate_summary(result)}"])
+
+
+def _notes(found: IndexConclusion, level: float) -> Iterator[str]:
+    """Yield what a reader must know of a conclusion."""
+    name = f"{found.detector}: {found.index.title}"
+    if found.scenes_needed:
+        yield (
+            f"{name} needs {found.scenes_needed} scenes with a value on both sides for a test at level {level:g}, "
+            f"{found.scenes} available"
+        )
+    if found.undefined:
+        yield f"{name} is undefined for the candidate on {counted(found.undefined, 'scene')} where the baseline has it"
+    if found.seeds_share is not None and found.seeds_share >= _MOST_SHARE:
+        share = value_text(found.seeds_share, "fraction")
+        yield f"{name}: seeds cause {share} of the variance of the difference; more seeds narrow the interval"
 
 
 def _row(found: IndexConclusion, *, mark: bool) -> list[str]:

@@ -31,6 +31,7 @@ from .inline_svg import to_inline_svg
 from .leaderboard_text import leaderboard_caption
 from .overlay_json import report_json
 from .sensitivity import sensitivity_figure
+from .sweep_text import break_down_text
 
 __all__ = ["html_report", "write_report"]
 
@@ -77,7 +78,7 @@ def html_report(report: Report, *, level: float = 0.8) -> str:
         scene_groups=_scene_groups(report),
         matrix=_matrix(report),
         charts=_charts(report, level),
-        break_downs=[line.break_down for line in report.sensitivities if line.break_down],
+        break_downs=[break_down_text(line.break_down) for line in report.sensitivities if line.break_down],
         published=_published(report),
         unsuccessful=report.boards[0].unsuccessful if report.boards else (),
         contents=_contents(report),
@@ -305,7 +306,7 @@ def _published(report: Report) -> dict[str, Any] | None:
     comparison: Comparison | None = report.comparison
     if comparison is None or not report.boards:
         return None
-    indices = [index for index in report.boards[0].indices if any(row.text(index.key) for row, _ in comparison.rows)]
+    indices = [index for index in report.boards[0].indices if any(row.text(index) for row, _ in comparison.rows)]
     return {
         "indices": indices,
         "rows": comparison.rows,

@@ -105,9 +105,9 @@ def _draw_line(
             markeredgecolor=INK,
             markeredgewidth=1,
         )
-    if line.place is not None:
+    if line.break_down is not None and line.break_down.value is not None:
         panel.plot(
-            line.place,
+            line.break_down.value,
             0.0,
             marker="v",
             color=colour,

@@ -1,19 +1,32 @@
-"""The table of a sweep as text."""
+"""A sweep as text: its table, and where detectors break down."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..benchmark.analysis.break_down import BreakDown
 from ..core.parameters import parameter_text
 from ..evaluators.base import Index
-from .format import column_title, interval_text, number_text
+from .format import column_title, index_name, interval_text, number_text, value_text
 from .tables import Column, Table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["sweep_table"]
+__all__ = ["break_down_text", "sweep_table"]
+
+
+def break_down_text(found: BreakDown) -> str:
+    """Return where a detector breaks down, in one sentence."""
+    index, level = found.index, value_text(found.level, found.index.unit)
+    what, axis = f"{found.detector}: {index_name(index)}", found.axis.removeprefix("scene.").replace("_", " ")
+    beyond, moves = ("below", "falls below") if index.better == "higher" else ("above", "rises above")
+    if found.value is None:
+        return f"{what} is never {beyond} {level} along {axis}"
+    if found.at_start:
+        return f"{what} is {beyond} {level} already at the first value of {axis}, {found.value:.4g}"
+    return f"{what} {moves} {level} at {axis} = {found.value:.4g}"
 
 
 def sweep_table(table: pd.DataFrame, axes: Sequence[str], index: Index) -> Table:

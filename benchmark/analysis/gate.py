@@ -28,60 +28,46 @@ import statistics
 from collections.abc import Mapping, Sequence
 
 from ...core.errors import ParameterError, UnknownNameError
-from ...core.registry import nearest_hint
+from ...core.registry import nearest_hint, parse_assignment
 from ...evaluators.base import Evaluator, Index
 from .baseline import Baseline, Measured
 from .inference import bootstrap_interval, holm, lowest_p, scenes_needed, sign_flip_p
 from .results import Conclusion, GateResult, IndexConclusion
 
-__all__ = ["DEFAULT_INDICES", "GATE_LEVEL", "compare", "different_scenes", "gated_indices", "margins_of", "seeds_share"]
+__all__ = ["GATE_LEVEL", "compare", "different_scenes", "gated_indices", "margins_of", "seeds_share"]
 
-#: What is gated when nothing is chosen: both kinds of error, of objects and of areas, and the outline's accuracy.
-DEFAULT_INDICES = (
-    "object.completeness",
-    "object.correctness",
-    "pixel.completeness",
-    "pixel.correctness",
-    "geometric.rmse",
-)
 #: Of 200 gate runs of an identical detector at most one says `worse`.
 GATE_LEVEL = 0.01
 #: Margins by unit: half a percent point, one percent of a ratio, two centimetres, a tenth of a pixel.
 DEFAULT_MARGINS = {"fraction": 0.005, "ratio": 0.01, "m": 0.02, "px": 0.1, "count": 0.0}
 
 
-def gated_indices(evaluator: Evaluator, keys: Sequence[str] | None = None) -> tuple[Index, ...]:
-    """Return the indices that are gated: those of the keys, else the default ones, else every directed main index."""
-    known = {index.key: index for index in evaluator.indices}
-    if keys:
-        for key in keys:
-            if key not in known:
-                raise UnknownNameError(
-                    f"the evaluator {evaluator.name!r} has no index {key!r}{nearest_hint(key, known)}"
-                )
-            if known[key].better == "neither":
-                raise ParameterError(f"{key} has no better direction and cannot be gated")
-        return tuple(known[key] for key in dict.fromkeys(keys))
-    chosen = tuple(known[key] for key in DEFAULT_INDICES if key in known)
-    return chosen or tuple(index for index in known.values() if index.main and index.better != "neither")
+def gated_indices(evaluator: Evaluator, names: Sequence[str] | None = None) -> tuple[Index, ...]:
+    """Return the indices that are gated: those named by key or symbol, else those that the evaluator declares."""
+    chosen = tuple(dict.fromkeys(map(evaluator.index, names or ()))) or evaluator.gated_indices()
+    for index in chosen:
+        if index.better == "neither":
+            raise ParameterError(f"{index.key} has no better direction and cannot be gated")
+    return chosen
 
 
 def margins_of(texts: Sequence[str], indices: Sequence[Index]) -> dict[str, float]:
     """Return the margin of every gated index: defaults by unit, replaced by ``object.quality=0.005``."""
     margins = {index.key: DEFAULT_MARGINS.get(index.unit, 0.0) for index in indices}
+    keys = {name: index.key for index in indices for name in (index.symbol, index.key) if name}
     for text in texts:
-        key, _, value = text.partition("=")
-        key = key.strip()
-        if key not in margins:
+        name, value = parse_assignment(text)
+        if name not in keys:
             raise UnknownNameError(
-                f"margin={text}: {key!r} is not gated{nearest_hint(key, margins)}; gated are {', '.join(margins)}"
+                f"margin={text}: {name!r} is not gated{nearest_hint(name, keys)}; gated are {', '.join(margins)}"
             )
         try:
-            margins[key] = float(value)
+            margin = float(value)
         except ValueError:
-            raise ParameterError(f"cannot read margin {text!r}: write INDEX=NUMBER, fractions as 0.005") from None
-        if not 0 <= margins[key] < float("inf"):
-            raise ParameterError(f"margin={text}: a margin is at least 0")
+            raise ParameterError(f"cannot read margin={text}: write INDEX=NUMBER, fractions as 0.005") from None
+        if not 0 <= margin < float("inf"):
+            raise ParameterError(f"margin={text}: a margin is a finite number of at least 0")
+        margins[keys[name]] = margin
     return margins
 
 
@@ -155,13 +141,10 @@ def compare_detector(
         low, high = bootstrap_interval(ds) or (None, None)
         conclusion: Conclusion = "undecided"
         p: float | None = None
-        note = ""
+        needed = scenes_needed(len(indices), level)
+        share = None
         if lowest_p(len(ds)) > level / len(indices):
             conclusion = "not measurable"
-            note = (
-                f"{label}: {len(indices)} indices at level {level:g} need {scenes_needed(len(indices), level)} scenes "
-                f"where both sides are defined, not {len(ds)}"
-            )
         elif effect is not None and low is not None and high is not None:
             if effect < -margin and worse[place] <= level:
                 conclusion, p = "worse", worse[place]
@@ -172,8 +155,6 @@ def compare_detector(
             else:
                 p = None if abs(effect) <= margin else worse[place] if effect < 0 else better[place]
                 share = seeds_share(before, after, index)
-                if share is not None and share >= 0.5:
-                    note = f"{label}: seeds make {100 * share:.0f} % of the scatter of {index.title}: more narrow it"
         conclusions.append(
             IndexConclusion(
                 detector=label,
@@ -187,7 +168,9 @@ def compare_detector(
                 p=p,
                 margin=margin,
                 scenes=len(ds),
-                note=note or _lost(label, before, after, index),
+                scenes_needed=needed if conclusion == "not measurable" else 0,
+                undefined=len(_by_scene(before, index).keys() - _by_scene(after, index).keys()),
+                seeds_share=share,
             )
         )
     return conclusions
@@ -218,13 +201,6 @@ def _pairs(before: Measured, after: Measured, index: Index) -> dict[str, tuple[f
     """Return (baseline, candidate) by scene, each the mean over its seeds, where both are defined."""
     old, new = _by_scene(before, index), _by_scene(after, index)
     return {scene: (old[scene], new[scene]) for scene in sorted(old.keys() & new.keys())}
-
-
-def _lost(label: str, before: Measured, after: Measured, index: Index) -> str:
-    lost = _by_scene(before, index).keys() - _by_scene(after, index).keys()
-    if not lost:
-        return ""
-    return f"{label}: {index.title} is undefined for the candidate on {len(lost)} scenes where the baseline has it"
 
 
 def seeds_share(before: Measured, after: Measured, index: Index) -> float | None:

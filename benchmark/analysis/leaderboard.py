@@ -10,8 +10,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core.errors import UnknownNameError
-from ...core.registry import nearest_hint
 from ...evaluators.base import Evaluation, Evaluator, Index
 from ...evaluators.tally import Tallies
 from ..plan import KeyedEvaluator
@@ -29,7 +27,7 @@ from .inference import (
 )
 from .results import Cell, Entry, Leaderboard, UnsuccessfulRun
 
-__all__ = ["default_rank_index", "make_leaderboard", "rank_index", "repeat_command", "unsuccessful_runs"]
+__all__ = ["make_leaderboard", "rank_index", "repeat_command", "unsuccessful_runs"]
 
 _RESAMPLES = 1000  # of pooled indices, each of which is summarised anew
 
@@ -47,7 +45,7 @@ def make_leaderboard(
     keyed : KeyedEvaluator
     title : str
     rank_by : str, optional
-        Index key; the evaluator's first quality by default.
+        Key or symbol of an index; by default the one that the evaluator declares.
 
     Notes
     -----
@@ -217,23 +215,9 @@ def _groups(boards: Sequence[_Tally], index: Index) -> tuple[dict[str, str], lis
     return {board.label: letter for board, letter in zip(boards, letters, strict=True)}, [note]
 
 
-def default_rank_index(evaluator: Evaluator) -> Index:
-    """Return the index that ranks when none is chosen: a quality, else the first that has a better direction."""
-    directed = [index for index in evaluator.indices if index.better != "neither"]
-    return next((index for index in directed if index.key == "object.quality"), (directed or evaluator.indices)[0])
-
-
-def rank_index(evaluator: Evaluator, key: str | None) -> Index:
-    """Return the index of that key, or the default one; an unknown key is answered with the nearest."""
-    if key is None:
-        return default_rank_index(evaluator)
-    known = {index.key: index for index in evaluator.indices}
-    if key not in known:
-        raise UnknownNameError(
-            f"the evaluator {evaluator.name!r} has no index {key!r}{nearest_hint(key, known)}; "
-            f"it has {', '.join(known)}"
-        )
-    return known[key]
+def rank_index(evaluator: Evaluator, name: str | None) -> Index:
+    """Return the index of that key or symbol, by default the one that the evaluator declares."""
+    return evaluator.ranking_index() if name is None else evaluator.index(name)
 
 
 def _described(evaluator: Evaluator) -> str:

@@ -21,25 +21,9 @@ import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-__all__ = ["PUBLISHED", "Check", "Comparison", "OursRow", "PublishedRow", "checks"]
+from ...evaluators.base import Index
 
-_KEYS = {
-    "C_m": "object.completeness",
-    "C_r": "object.correctness",
-    "Q_l": "object.quality",
-    "M_d": "object.multiple_detection_rate",
-    "D_o": "object.detection_overlap_rate",
-    "C_rd": "object.detection_cross_lap_rate",
-    "C_rr": "object.reference_cross_lap_rate",
-    "C_mp": "pixel.completeness",
-    "C_rp": "pixel.correctness",
-    "Q_lp": "pixel.quality",
-    "A_oe": "pixel.area_omission_error",
-    "A_ce": "pixel.area_commission_error",
-    "B_f": "pixel.branching_factor",
-    "M_f": "pixel.miss_factor",
-    "RMSE": "geometric.rmse",
-}
+__all__ = ["PUBLISHED", "Check", "Comparison", "OursRow", "PublishedRow", "checks"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,9 +53,9 @@ class PublishedRow:
     printed: Mapping[str, str]
     average: bool = False
 
-    def text(self, key: str) -> str:
-        """Return what is printed for an index key; empty where the paper says nothing."""
-        return next((text for symbol, text in self.printed.items() if _KEYS[symbol] == key), "")
+    def text(self, index: Index) -> str:
+        """Return what is printed for an index, which has the papers' symbol; empty where a paper gives no value."""
+        return self.printed.get(index.symbol, "")
 
 
 def _row(

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from ...evaluators.base import Index
 from ..execution.scene_picture import ScenePicture
+from .break_down import BreakDown
 from .published import Comparison
 from .results import GateResult, Leaderboard
 
@@ -176,10 +177,8 @@ class Sensitivity:
         In the order of the axis.
     default : Any
         Value that the detector has when nothing is said; None for generator axes.
-    break_down : str
-        Where the index passes a level, in words; empty when it was not looked for.
-    place : float, optional
-        That value of the axis.
+    break_down : BreakDown, optional
+        Where the index passes a level; None when it was not looked for.
     """
 
     detector: str
@@ -188,8 +187,7 @@ class Sensitivity:
     index: Index
     points: tuple[SensitivityPoint, ...]
     default: Any = None
-    break_down: str = ""
-    place: float | None = None
+    break_down: BreakDown | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

