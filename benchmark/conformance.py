@@ -57,7 +57,7 @@ def check_detector(detector: Detector) -> list[Check]:
         _check("requires names inputs that scenes have", lambda: _lacks(detector, scene)),
         _check("finds footprints that are valid and inside the scene", lambda: _found(detector, scene)),
         _check("the same seed gives the same footprints", lambda: _repeats(detector, scene)),
-        _check("is stochastic exactly if it says so", lambda: _stochastic(detector, scene)),
+        _check("`stochastic` matches the behaviour", lambda: _stochastic(detector, scene)),
         _check("leaves the scene as it was", lambda: "" if _digest(scene) == before else "it changed the arrays"),
         _check("a scene without buildings is no error", lambda: _found(detector, _meadow(scene))),
         _check(_ELSEWHERE, lambda: _as_here(elsewhere, detector, scene)),

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import sys
 from contextlib import redirect_stdout
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from ..core.errors import ParameterError, UnknownNameError
 from . import completion
 from .command import load_plugins
 from .options import PluginOption
-
-if TYPE_CHECKING:
-    from ..detectors.base import Detector
-    from ..evaluators.base import Evaluator
 
 __all__ = ["check_plugin"]
 
@@ -32,48 +26,17 @@ def check_plugin(
 ) -> None:
     """Check that a detector or evaluator follows the rules, on a small built-in scene; exit code 3 if not."""
     from ..benchmark import conformance
-    from ..core.registry import nearest_hint, parse_selection
-    from ..detectors.registry import DETECTORS, make_detector
-    from ..evaluators.registry import EVALUATORS, make_evaluator
+    from ..benchmark.catalogue import find_plugin
 
     load_plugins(plugin)
-    known = [*DETECTORS.names(), *EVALUATORS.names()]
-    word = parse_selection(name)[0]
-    chosen: Detector | Evaluator
-    if ".py" in word:
-        chosen = _from_file(name)
-    elif word in DETECTORS.names():
-        chosen = make_detector(name)
-    elif word in EVALUATORS.names():
-        chosen = make_evaluator(name)
-    else:
-        raise UnknownNameError(f"no plugin called {word!r}{nearest_hint(word, known)}; there are {', '.join(known)}")
+    chosen = find_plugin(name)
     with redirect_stdout(sys.stderr):
         checks = conformance.check_plugin(chosen)
     for check in checks:
         typer.echo(
-            f"{'ok    ' if check.passed else 'BROKEN'}  {check.rule}{': ' + check.problem if check.problem else ''}"
+            f"{'ok    ' if check.passed else 'FAILED'}  {check.rule}{': ' + check.problem if check.problem else ''}"
         )
-    broken = sum(not check.passed for check in checks)
-    typer.echo(f"{name}: {len(checks) - broken} of {len(checks)} rules kept")
-    if broken:
+    failed = sum(not check.passed for check in checks)
+    typer.echo(f"{name}: {len(checks) - failed} of {len(checks)} rules followed")
+    if failed:
         raise typer.Exit(3)
-
-
-def _from_file(selection: str) -> Detector | Evaluator:
-    """Return the detector or the evaluator that ``file.py:Class`` names, whichever it is."""
-    from ..core.registry import parse_selection
-    from ..detectors.registry import DETECTORS, make_detector
-    from ..evaluators.registry import EVALUATORS, make_evaluator
-
-    word = parse_selection(selection)[0]
-    file = Path(word.partition(".py")[0] + ".py")
-    if ":" not in word.rpartition(".py")[2] and not DETECTORS.add_all(file) and not EVALUATORS.add_all(file):
-        raise UnknownNameError(f"{file} holds neither a detector nor an evaluator: derive from roofbench.Detector")
-    try:
-        return make_detector(selection)
-    except ParameterError as error:
-        try:
-            return make_evaluator(selection)
-        except ParameterError:
-            raise error from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["detectors", "evaluators", "indices", "plugins", "presets", "suites", "suites_and_scenes"]
+__all__ = ["detectors", "evaluators", "everything", "indices", "plugins", "presets", "suites", "suites_and_scenes"]
 
 
 def detectors(incomplete: str) -> list[str]:
@@ -19,6 +19,11 @@ def evaluators(incomplete: str) -> list[str]:
     from ..evaluators.registry import EVALUATORS
 
     return _starting(EVALUATORS.names(), incomplete)
+
+
+def everything(incomplete: str) -> list[str]:
+    """Return all names that start so."""
+    return [*plugins(incomplete), *suites_and_scenes(incomplete), *indices(incomplete)]
 
 
 def indices(incomplete: str) -> list[str]:

@@ -21,6 +21,8 @@ from .detect import detect
 from .evaluate import evaluate
 from .export import export
 from .gate import gate
+from .info import info
+from .list import list_names
 from .ls import ls
 from .report import report
 from .run import run
@@ -52,6 +54,8 @@ app.add_typer(plot.app)
 app.add_typer(scenes.app)
 app.add_typer(baseline.app)
 app.command("gate", cls=Command)(gate)
+app.command("list", cls=Command)(list_names)
+app.command("info", cls=Command)(info)
 app.command("ls", cls=Command)(ls)
 app.command("why", cls=Command)(why)
 app.command("score", cls=Command)(score)

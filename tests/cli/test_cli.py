@@ -151,7 +151,7 @@ def test_a_value_that_cannot_be_read_is_refused_by_the_name_of_its_option(cli, w
 
 
 def test_check_plugin_accepts_an_honest_detector_and_names_broken_rules(cli, misbehaving, tmp_path):
-    assert "10 of 10 rules kept" in cli("check-plugin", misbehaving).stdout
+    assert "10 of 10 rules followed" in cli("check-plugin", misbehaving).stdout
     (tmp_path / "bad.py").write_text(
         "from dataclasses import dataclass\nimport numpy as np\nimport roofbench as rb\n\n"
         "@dataclass(frozen=True, kw_only=True)\nclass Bad(rb.Detector):\n"
@@ -163,13 +163,13 @@ def test_check_plugin_accepts_an_honest_detector_and_names_broken_rules(cli, mis
         "        return rb.Footprints.from_rectangles([[(x, y), (x + 9, y), (x + 9, y + 9), (x, y + 9)]])\n"
     )
     told = cli("check-plugin", "bad.py", code=3).stdout
-    assert "BROKEN  the same seed gives the same footprints: draw random numbers from rng only" in told
-    assert "BROKEN  leaves the scene as it was" in told
-    assert "BROKEN  documents its parameters: no doc= for limit" in told
+    assert "FAILED  the same seed gives the same footprints: draw random numbers from rng only" in told
+    assert "FAILED  leaves the scene as it was" in told
+    assert "FAILED  documents its parameters: no doc= for limit" in told
 
 
 def test_check_plugin_accepts_the_built_in_evaluator(cli):
-    assert "rules kept" in cli("check-plugin", "threshold-free").stdout
+    assert "rules followed" in cli("check-plugin", "threshold-free").stdout
 
 
 BAD_PLUGINS = """
@@ -235,7 +235,7 @@ def bad_plugins(tmp_path_factory):
 def test_check_plugin_outlives_a_detector_that_takes_its_process_along(cli, bad_plugins, name, problem):
     result = cli("check-plugin", f"{bad_plugins}:{name}", code=3)
     assert problem in result.stdout
-    assert "rules kept" in result.stdout.splitlines()[-1]
+    assert "rules followed" in result.stdout.splitlines()[-1]
     assert "told while" not in result.stdout
 
 

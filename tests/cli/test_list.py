@@ -1,0 +1,69 @@
+"""``roofbench list`` and ``roofbench info``: what there is, each name with its meaning."""
+
+import json
+
+import pytest
+from harness.command_line import roofbench
+
+import roofbench as rb
+from roofbench.benchmark.catalogue import KINDS, entries, entry_of
+from roofbench.core.errors import UnknownNameError
+from roofbench.scenes.builtin import hamlet
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_entry_has_a_name_and_a_meaning_in_one_line(kind, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = roofbench("list", kind, folder=tmp_path).stdout.splitlines()
+    found = entries(kind)
+    assert len(lines) == len(found) > 0
+    assert max(map(len, lines)) <= 80
+    for line, entry in zip(lines, found, strict=True):
+        assert line.startswith(entry.name)
+        assert entry.meaning
+        assert "\n" not in entry.meaning
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_listed_can_be_explained(kind):
+    for entry in entries(kind):
+        assert entry_of(entry.name).name == entry.name
+
+
+def test_a_list_can_be_read_by_programs(tmp_path):
+    rows = json.loads(roofbench("list", "detectors", "-f", "json", folder=tmp_path).stdout)
+    assert {"name", "inputs", "random", "meaning"} == set(rows[0])
+    assert "ndsm" in [row["name"] for row in rows]
+    assert roofbench("list", "suites", "-f", "csv", folder=tmp_path).stdout.startswith("name,scenes,")
+
+
+def test_scene_folders_are_listed_beside_presets(tmp_path):
+    rb.save_scene(hamlet(1), tmp_path / "village")
+    assert "village" in roofbench("list", "scenes", folder=tmp_path).stdout
+    assert "scene folder with points" in roofbench("info", "village", folder=tmp_path).stdout
+
+
+def test_a_detector_is_explained_with_its_parameters(tmp_path):
+    told = roofbench("info", "ndsm", folder=tmp_path).stdout
+    assert "ndsm (detector)" in told
+    assert "height [2.5 m], from 0.5 to 20 m" in told
+    assert "Source: Awrangjeb 2010, section 3.2" in told
+    assert "Example: roofbench run quick -d 'ndsm[height=1.5]'" in told
+
+
+@pytest.mark.parametrize("name", ["Q_l", "object.quality"])
+def test_an_index_is_explained_by_key_and_by_symbol(name, tmp_path):
+    assert "quality: TP/(TP+FP+FN)" in roofbench("info", name, folder=tmp_path).stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "nearest"),
+    [("ndms", "ndsm"), ("quik", "quick"), ("fairfeild", "fairfield"), ("object.qualty", "object.quality")],
+)
+def test_a_name_that_does_not_exist_is_answered_with_the_nearest(name, nearest):
+    with pytest.raises(UnknownNameError, match=f"did you mean '{nearest}'"):
+        entry_of(name)
+
+
+def test_a_plugin_of_a_file_is_explained(misbehaving, tmp_path):
+    assert "(detector)" in roofbench("info", misbehaving, folder=tmp_path).stdout
