@@ -6,6 +6,9 @@ declaration serves validation, ``-d "name[parameter=value]"`` on the command lin
 An *execution option* is a dataclass field made by `execution_option`: the number of threads, for instance. It changes
 the time and memory of a run and never its result. It is set in the same way, ``name[threads=2]`` or ``-p threads=2``,
 but it is no parameter: keys, labels and sweeps do not see it, and objects that differ in it alone are equal.
+
+A *mode* is a named set of defaults: `Parameterised.modes` maps values of the parameter ``mode`` to defaults that
+replace those of the fields. A parameter that is given beside the mode overrides it: ``original[mode=paper,rise=0.1]``.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ import numbers
 import types
 import typing
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from .errors import ParameterError
 from .registry import nearest_hint
@@ -191,10 +194,30 @@ def parameter_text(value: Any) -> str:
 
 
 class Parameterised:
-    """Mixin of frozen dataclasses whose fields are parameters: checked on construction, listed on request."""
+    """Mixin of frozen dataclasses whose fields are parameters: checked on construction, listed on request.
+
+    Attributes
+    ----------
+    modes : mapping
+        Value of the parameter ``mode`` to the defaults that it sets, by parameter; empty for classes without modes.
+    """
+
+    modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
+
+    def __new__(cls, *_: Any, **given: Any) -> Self:
+        """Note which parameters are given: a mode sets the others."""
+        created = super().__new__(cls)
+        if cls.modes and given:
+            object.__setattr__(created, "_given", frozenset(given))
+        return created
 
     def __post_init__(self) -> None:
         owner = getattr(self, "name", None) or type(self).__name__
+        if self.modes:
+            given = self.__dict__.pop("_given", frozenset())
+            for name, value in self._mode_defaults().items():
+                if name not in given:
+                    object.__setattr__(self, name, value)
         for name, rule in {**self.parameters(), **self.execution_options()}.items():
             object.__setattr__(self, name, rule.check(getattr(self, name), owner))
 
@@ -240,6 +263,19 @@ class Parameterised:
             checked[name] = rule.parse(value, owner) if as_text else rule.check(value, owner)
         return cls(**checked)
 
+    def defaults(self) -> dict[str, Any]:
+        """Return the default values by name, those of the mode included."""
+        plain = {name: rule.default for name, rule in self.parameters().items()}
+        return {**plain, **self._mode_defaults()}
+
+    def _mode_defaults(self) -> Mapping[str, Any]:
+        mode = getattr(self, "mode", None)
+        return self.modes.get(mode, {}) if isinstance(mode, str) else {}
+
+    def replaced(self, values: Mapping[str, Any]) -> Self:
+        """Return a copy with other values; a new mode changes every parameter that has the old mode's default."""
+        return type(self).build({**self.execution_values(), **self.changed(), **values})
+
     def values(self) -> dict[str, Any]:
         """Return the parameter values by name."""
         return {name: getattr(self, name) for name in self.parameters()}
@@ -249,9 +285,12 @@ class Parameterised:
         return {name: getattr(self, name) for name in self.execution_options()}
 
     def changed(self) -> dict[str, Any]:
-        """Return the values that differ from their default."""
-        rules = self.parameters()
-        return {name: value for name, value in self.values().items() if value != rules[name].default}
+        """Return the values that differ from their default; `build` makes an equal object of them.
+
+        The mode counts as changed when it is not the default one; the other values are compared with its defaults.
+        """
+        defaults = self.defaults()
+        return {name: value for name, value in self.values().items() if value != defaults[name]}
 
 
 def _plain_type(hint: Any) -> tuple[type, bool]:

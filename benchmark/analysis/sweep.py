@@ -143,7 +143,7 @@ def make_sweep(
             own = {name: value for name, value in point.values.items() if not name.startswith(_SCENE)}
             if not own.keys() <= entry.detector.parameters().keys():
                 continue  # another detector's axis
-            detector = type(entry.detector).build({**entry.detector.values(), **own})
+            detector = entry.detector.replaced(own)
             part = replace(suite, scenes=_scenes(suite, point), detectors=(DetectorEntry(detector, entry.seeds),))
             points.append((point, entry.detector, make_plan(part, store, rerun=rerun)))
     runs = {run.identity.key: run for _, _, plan in points for run in plan.runs}

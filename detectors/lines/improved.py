@@ -7,8 +7,9 @@ what that reading costs.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,8 @@ from .boxes import Boxes, lengths, prefix_sums
 from .entropy import grey_levels, local_entropy
 from .extension import band, mean_in_boxes
 from .image_edges import ImageEdges, extract_edges
-from .line_detector import PAPER_PIXEL, LineDetector
+from .line_detector import LineDetector
+from .line_parameters import PAPER_PIXEL
 from .rasters import Rasters
 from .segments import Segments
 from .texture import Texture, TextureRules, texture_of
@@ -35,6 +37,29 @@ class Improved(LineDetector):
     """Line detector with texture of Awrangjeb, Zhang & Fraser (2011)."""
 
     name: ClassVar[str] = "improved"
+    #: "paper": every reading at its printed form, in pixels of the paper's images.
+    modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "paper": {
+            "marking": "squares",
+            "neighbourhood": 0.75,
+            "curve_step": 0.1,
+            "missed_corner": 1000.0,
+            "vegetation": "pseudo-ndvi",
+            "extension_stop": 0.4,
+            "extension_part": 1000.0,
+            "inside_margin": 0.0,
+            "inside_share": 1.0,
+            "rise": 0.0,
+            "new_share": 0.0,
+            "below_ground": 1.0,
+            "entropy_threshold": 0.3,
+            "adjustment": "longest",
+            "vote_length": "printed",
+            "texture_margin": 0.0,
+            "edge_contrast": 0.0,
+            "peak_ratio": 1.0,
+        },
+    }
 
     ground: str = parameter(
         "point-dem", choices=("tile-dem", "tile-mode", "point-dem"),

@@ -1,24 +1,18 @@
-"""The parameters and steps that both line detectors share.
-
-Parameters that a paper prints in pixels of its images are declared in those (`PAPER_PIXEL`, 0.15 m) or in metres, never
-in pixels of the scene, so that the values do not depend on the ground sampling distance.
-"""
+"""The steps of both line detectors, from the masks to the final rectangles."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.parameters import parameter
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid, Image
 from ...scenes.scene import Scene
-from ..base import Detector
 from ..steps import Step
 from .adjustment import by_length, rotate
 from .boxes import Boxes, box_corners, lengths, prefix_sums, widths
@@ -29,6 +23,7 @@ from .duplicates import find_duplicates
 from .extension import Cover, Growth, extend_lines, last_step
 from .final_rectangles import FinalRules, final_rectangles
 from .initial_rectangles import INSIDE, TOO_NARROW, initial_rectangles
+from .line_parameters import PAPER_PIXEL, LineParameters
 from .line_steps import line_steps
 from .masks import build_masks, ground_correction, ground_heights, pulse_spacing
 from .rasters import Rasters
@@ -40,10 +35,8 @@ if TYPE_CHECKING:
     from .image_edges import ImageEdges
     from .texture import Texture
 
-__all__ = ["PAPER_PIXEL", "LineDetector"]
+__all__ = ["LineDetector"]
 
-#: Ground sampling distance that the 2010 paper's pixel counts refer to, metres.
-PAPER_PIXEL = 0.15
 #: The edge of a mask lies half a pixel outside the centres of its border pixels.
 _OUTSET = 0.5
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
@@ -58,180 +51,8 @@ _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
 
 
 @dataclass(frozen=True, kw_only=True)
-class LineDetector(Detector):
-    """Parameters and shared steps of the detectors `original` and `improved`."""
-
-    requires: ClassVar[tuple[str, ...]] = ("points", "colour")
-
-    ground: str = parameter(
-        "tile-dem",
-        choices=("tile-dem", "tile-mode", "point-dem"),
-        doc="ground height: mean DEM of the tile, most frequent height of the tile's points, or DEM under the point",
-        source="2010, 3.2; conference version, 3.1; 2011, 3.1",
-    )
-    below_ground: float = parameter(
-        0.1, minimum=0, maximum=1, swept=(0.05, 0.1, 0.2, 1.0),
-        doc="largest share of the surrounding points that may lie below the ground before it is lowered "
-        "(`ground=point-dem`); 1 never lowers it, as printed",
-        source="2011, 3.1; reading",
-    )  # fmt: skip
-    tile_size: float = parameter(
-        450, unit="px of 0.15 m", minimum=20, swept=(400, 450, 500, 550, 600),
-        doc="side of the tiles with one ground height each", source="2010, 3.2 and 4.4.1",
-    )  # fmt: skip
-    height: float = parameter(
-        2.5, unit="m", minimum=0, doc="least height above ground of a building", source="2010, 3.2"
-    )
-    marking: str = parameter(
-        "nearest", choices=("nearest", "squares"),
-        doc="how points mark the masks: the nearest point decides, or each point marks a square, as printed",
-        source="2010, 3.2; reading",
-    )  # fmt: skip
-    neighbourhood: float | None = parameter(
-        None, unit="m", minimum=0,
-        doc="side of the square that a point marks, and largest distance of the nearest point; none: 1.5 point "
-        "spacings, the paper's 5 px of 0.15 m",
-        source="2010, 3.2",
-    )  # fmt: skip
-    minimum_side: float = parameter(
-        3.0, unit="m", minimum=0, doc="least length and width of a building; shorter edges and lines are dropped",
-        source="2010, 3.3.1",
-    )  # fmt: skip
-    smoothing: float = parameter(
-        3.0, unit="curve points", minimum=0, doc="sigma of the Gaussian along a curve", source="2010, 3.3.1"
-    )
-    curve_step: float | None = parameter(
-        None, unit="m", minimum=0.01,
-        doc="distance of curve points; none: 0.3 point spacings, at least a third of a pixel",
-        source="2010, 3.3.1: pixels of 0.15 m at a spacing of 0.5 m; reading",
-    )  # fmt: skip
-    corner_product: float = parameter(
-        0.2, minimum=0, maximum=1, doc="least product of the three normalised accumulated chord distances",
-        source="CPDA, 2009",
-    )  # fmt: skip
-    corner_angle: float = parameter(
-        157.0, unit="deg", minimum=90, maximum=180,
-        doc="interior angles from this value to 360 minus it (203) are no corner", source="CPDA, 2009",
-    )  # fmt: skip
-    missed_corner: float | None = parameter(
-        None, unit="m", minimum=0.01,
-        doc="RMS distance of a curve from its line above which it is split; none: 0.4 point spacings, at least half a "
-        "pixel; 1000 never splits, as printed",
-        source="reading",
-    )  # fmt: skip
-    inside_reach: float = parameter(
-        3.0,
-        unit="px of 0.15 m",
-        minimum=0,
-        doc="distance of the inside point from its line",
-        source="2010, 3.3.1; reading",
-    )
-    vegetation: str = parameter(
-        "green-red", choices=("green-red", "pseudo-ndvi"),
-        doc="index on images without near infrared: 2(G-R)/(G+R), or the printed (R-G)/(R+G)",
-        source="2010, 4.3; reading",
-    )  # fmt: skip
-    vegetation_threshold: float = parameter(
-        48.0, minimum=0, maximum=255, swept=(32, 40, 48, 56, 64),
-        doc="mean vegetation index (0..255) above which an area is vegetation", source="2010, 3.3.1 and 4.4.1",
-    )  # fmt: skip
-    band_width: float = parameter(
-        3.0, unit="m", minimum=0.1, doc="width of the rectangle beside a line in which the vegetation index is tested",
-        source="2010, 3.3.1",
-    )  # fmt: skip
-    adjustment_angle: float = parameter(
-        22.5, unit="deg", minimum=0, maximum=45, doc="largest rotation of a line to be parallel or perpendicular",
-        source="2010, 3.3.2",
-    )  # fmt: skip
-    adjustment_radius: float = parameter(
-        50.0, unit="m", minimum=0, doc="largest distance of a line and its reference in the adjustment to neighbours",
-        source="2010, 3.3.2",
-    )  # fmt: skip
-    extension: float = parameter(
-        3.0, unit="m", minimum=0.1, doc="depth and first step of the extension of lines and initial rectangles",
-        source="2010, 3.3.2",
-    )  # fmt: skip
-    extension_stop: float | None = parameter(
-        None, unit="m", minimum=0.01,
-        doc="step below which the extension of a line or initial rectangle ends; none: 0.8 point spacings",
-        source="2010, 3.3.2: 0.4 m at a spacing of 0.5 m",
-    )  # fmt: skip
-    extension_black: float = parameter(
-        0.7, minimum=0, maximum=1, swept=(0.6, 0.7, 0.8, 0.9), doc="least share of black in a step of that extension",
-        source="2010, 3.3.2",
-    )  # fmt: skip
-    extension_part: float | None = parameter(
-        None, unit="m", minimum=0.1,
-        doc="least length of a part of a side that is tested; none: the first step, at least 3.5 point spacings; 1000: "
-        "the whole side",
-        source="2010, 3.3.2: 3 m, and 3.3.3: the same technique for sides; reading",
-    )  # fmt: skip
-    initial_width: float = parameter(
-        1.5, unit="m", minimum=0.1, doc="width of a rectangle before it is extended", source="2010, 3.3.3"
-    )
-    inside_margin: float | None = parameter(
-        None, unit="m", minimum=0,
-        doc="distance outside a rectangle up to which a line counts as inside; none: last step of its extension + one "
-        "pixel; 0 as printed",
-        source="2010, 3.3.3; reading",
-    )  # fmt: skip
-    inside_share: float = parameter(
-        0.9, minimum=0, maximum=1,
-        doc="least share of its length inside a rectangle for a line to count as inside, with its midpoint",
-        source="2010, 3.3.3; reading",
-    )  # fmt: skip
-    reduction: float = parameter(
-        0.15, minimum=0, maximum=0.9, swept=(0.10, 0.15, 0.20, 0.25, 0.30),
-        doc="share by which length and width of initial rectangles shrink", source="2010, 3.4.1 and 4.4.1",
-    )  # fmt: skip
-    part_share: float = parameter(
-        0.97,
-        minimum=0,
-        maximum=1,
-        doc="least share of a part of a colour histogram in its range",
-        source="2010, 3.4.1",
-    )
-    total_share: float = parameter(
-        0.90, minimum=0, maximum=1, doc="least share of the rectangle in the parts used", source="2010, 3.4.1"
-    )
-    strip: float = parameter(
-        0.35, unit="m", minimum=0.01, doc="first step of the final extension", source="2010, 3.4.2"
-    )
-    colour_similarity: float = parameter(
-        0.4, minimum=0, maximum=1, swept=(0.2, 0.3, 0.4, 0.5, 0.6),
-        doc="least share of a step in the dominant range of Y, I and Q each", source="2010, 3.4.2 and 4.4.1",
-    )  # fmt: skip
-    black_share: float = parameter(
-        0.9, minimum=0, maximum=1, swept=(0.6, 0.7, 0.8, 0.9, 1.0),
-        doc="least share of a step that is black in the secondary mask", source="2010, 3.4.2 and 4.4.1",
-    )  # fmt: skip
-    gap_share: float = parameter(
-        0.1,
-        minimum=0,
-        maximum=1,
-        doc="primary black below which the next rise ends the extension of a side",
-        source="2010, 3.4.2",
-    )
-    rise: float = parameter(
-        0.1, minimum=0, maximum=1, doc="largest increase of primary black that is no rise; 0 as printed",
-        source="2010, 3.4.2; reading",
-    )  # fmt: skip
-    compare: str = parameter(
-        "shrunk", choices=("shrunk", "whole"),
-        doc="size of an initial rectangle in the test that drops it wholly inside a final one",
-        source="2010, 3.4; reading",
-    )  # fmt: skip
-    new_share: float = parameter(
-        0.1, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
-        doc="least share of a final rectangle outside the larger ones at an oblique angle to it; with less it is a "
-        "duplicate; 0 keeps all, as printed",
-        source="2010, 3.4: parts adjoin at right angles; reading",
-    )  # fmt: skip
-    parallel_angle: float = parameter(
-        3.0, unit="deg", minimum=0, maximum=45,
-        doc="largest angle between final rectangles that are parallel or perpendicular",
-        source="2010, 3.4; reading",
-    )  # fmt: skip
+class LineDetector(LineParameters):
+    """Shared steps of the detectors `original` and `improved`."""
 
     def run(self, rasters: Rasters) -> Trace:
         """Run all steps that follow the masks, keeping the intermediate results."""
@@ -327,7 +148,7 @@ class LineDetector(Detector):
         assert points is not None
         assert image is not None
         grid = image.grid
-        tile_side = self.tile_size * PAPER_PIXEL
+        tile_side = self.tile_size * (PAPER_PIXEL if self.tile_pixel == "printed" else grid.gsd)
         spacing = pulse_spacing(points, grid)
         surface = None if self.ground == "tile-mode" or not len(points) else scene.heights.ground
         ground = ground_heights(points, surface, method=self.ground, tile_side=tile_side)
@@ -339,6 +160,7 @@ class LineDetector(Detector):
             grid,
             neighbourhood=1.5 * spacing if self.neighbourhood is None else self.neighbourhood,
             nearest=self.marking == "nearest",
+            clip=self.border == "drop",
         )
         cover = Cover(prefix_sums(masks.primary), vegetation_prefix(image, self.vegetation), self._entropy(image))
         bands = [image.bands.index(name) for name in ("red", "green", "blue")]
@@ -380,7 +202,8 @@ class LineDetector(Detector):
         )
         reach = max(1.0, self.inside_reach * PAPER_PIXEL / gsd)
         lines = inside_first(segments.lines, black, reach=reach, outset=_OUTSET)
-        return Segments(lines, segments.shapes), beyond_coverage(lines, rasters.masks.coverage, reach)
+        on_border = beyond_coverage(lines, rasters.masks.coverage, reach) & (self.border == "drop")
+        return Segments(lines, segments.shapes), on_border
 
     def _initial_rectangles(self, rasters: Rasters, lines: Boxes) -> tuple[Boxes, NDArray[np.int64]]:
         """Return the initial rectangles, and the index of the one of each line, `INSIDE` or `TOO_NARROW`."""
@@ -404,8 +227,8 @@ class LineDetector(Detector):
             reduction=self.reduction,
             part_share=self.part_share,
             total_share=self.total_share,
-            strip=max(self.strip / gsd, 2.0),
-            least_strip=1.0,
+            strip=max(self.strip / gsd, self.least_strip),
+            least_strip=min(1.0, self.least_strip),
             colour_share=self.colour_similarity,
             black_share=self.black_share,
             gap_share=self.gap_share,

@@ -211,7 +211,13 @@ def _nearest(
 
 
 def build_masks(
-    points: PointCloud, thresholds: NDArray[np.float64], grid: Grid, *, neighbourhood: float, nearest: bool
+    points: PointCloud,
+    thresholds: NDArray[np.float64],
+    grid: Grid,
+    *,
+    neighbourhood: float,
+    nearest: bool,
+    clip: bool = True,
 ) -> Masks:
     """Build both masks.
 
@@ -225,6 +231,8 @@ def build_masks(
         Whether the nearest point decides: the primary mask is white where it is low or no high point is near, and the
         secondary mask is black also where it is high, up to `neighbourhood` away. Otherwise both masks are made of
         squares, as printed.
+    clip : bool
+        Whether the primary mask is white outside the coverage.
     """
     side = 2 * max(0, round((neighbourhood / grid.gsd - 1) / 2)) + 1
     coverage = _coverage(points, grid)
@@ -236,5 +244,6 @@ def build_masks(
     else:
         primary = _squares(low, side)
     np.subtract(1, primary, out=primary)
-    primary &= coverage
+    if clip:
+        primary &= coverage
     return Masks(primary, secondary, coverage, side)

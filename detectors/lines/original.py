@@ -7,8 +7,9 @@ docs/results/line-detectors.md lists how each open point of the print is read an
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,24 @@ class Original(LineDetector):
     """Line detector of Awrangjeb, Ravanbakhsh & Fraser (2010)."""
 
     name: ClassVar[str] = "original"
+    #: "paper": every reading at its printed form, in pixels of the paper's images.
+    modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "paper": {
+            "marking": "squares",
+            "neighbourhood": 0.75,
+            "curve_step": 0.15,
+            "missed_corner": 1000.0,
+            "vegetation": "pseudo-ndvi",
+            "adjustment_reference": "any",
+            "adjustment_share": 1.0,
+            "extension_stop": 0.4,
+            "extension_part": 1000.0,
+            "inside_margin": 0.0,
+            "inside_share": 1.0,
+            "rise": 0.0,
+            "new_share": 0.0,
+        },
+    }
 
     adjustment_reference: str = parameter(
         "longer", choices=("longer", "any"),

@@ -1,6 +1,9 @@
 """Parameters decide the result; execution options change the time alone, and no identity depends on them."""
 
+import copy
+import pickle
 from dataclasses import dataclass, fields
+from typing import ClassVar
 
 import pytest
 
@@ -48,3 +51,42 @@ def test_a_derived_class_has_the_fields_of_its_base_and_its_own():
     assert Threshold().values() == {"height": 2.5}
     assert Finer().values() == {"height": 2.5, "cell": 0.5}
     assert Finer(threads=3).execution_values() == {"threads": 3}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading(Parameterised):
+    name = "reading"
+    modes: ClassVar = {"paper": {"rise": 0.0, "share": 1.0}}
+    mode: str = parameter("default", choices=("default", "paper"), doc="set of defaults")
+    rise: float = parameter(0.1, minimum=0, doc="largest rise")
+    share: float = parameter(0.5, minimum=0, maximum=1, doc="share")
+    height: float = parameter(2.5, doc="height")
+
+
+def test_a_mode_sets_the_parameters_that_are_not_given():
+    paper = Reading(mode="paper")
+    assert paper.values() == {"mode": "paper", "rise": 0.0, "share": 1.0, "height": 2.5}
+    assert paper.changed() == {"mode": "paper"}
+    assert Reading().values() == {"mode": "default", "rise": 0.1, "share": 0.5, "height": 2.5}
+    assert Reading().changed() == {}
+
+
+@pytest.mark.parametrize("values", [{"mode": "paper", "rise": "0.1"}, {"rise": 0.1, "mode": "paper"}])
+def test_a_parameter_beside_a_mode_overrides_it_even_with_the_plain_default(values):
+    chosen = Reading.build(values)
+    assert (chosen.rise, chosen.share) == (0.1, 1.0)
+    assert chosen.changed() == {"mode": "paper", "rise": 0.1}
+    assert Reading.build(chosen.changed()) == Reading.build(chosen.values()) == chosen
+    assert copy.copy(chosen) == pickle.loads(pickle.dumps(chosen)) == chosen
+    assert vars(chosen).keys() == chosen.values().keys()
+
+
+def test_another_mode_changes_what_was_not_overridden():
+    chosen = Reading(rise=0.3, height=3.0).replaced({"mode": "paper"})
+    assert chosen.values() == {"mode": "paper", "rise": 0.3, "share": 1.0, "height": 3.0}
+    assert chosen.replaced({"mode": "default"}) == Reading(rise=0.3, height=3.0)
+
+
+def test_an_unknown_mode_is_refused():
+    with pytest.raises(ParameterError, match="mode must be one of default, paper, not 'print'"):
+        Reading(mode="print")
