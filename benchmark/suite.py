@@ -26,7 +26,7 @@ from ..core.registry import nearest_hint, parse_selection
 from ..detectors.base import Detector
 from ..detectors.registry import DETECTORS, make_detector
 from ..evaluators.base import Evaluator
-from ..evaluators.registry import DEFAULT, make_evaluator
+from ..evaluators.registry import make_evaluator
 from ..scenes.scene import Scene
 from .identity.recipes import SceneRecipe, label_of, preset_names
 
@@ -202,7 +202,7 @@ def suite_of_words(
 
 def suite_of_scenes(scenes: Iterable[SceneRecipe | Scene], *, name: str = "scenes") -> Suite:
     """Return a suite of these scenes with every detector that needs no parameter and the default evaluator."""
-    return Suite(name, tuple(scenes), all_detectors(), (make_evaluator(DEFAULT),))
+    return Suite(name, tuple(scenes), all_detectors(), (make_evaluator(),))
 
 
 def all_detectors() -> tuple[DetectorEntry, ...]:
@@ -290,7 +290,7 @@ def _parse(text: str, *, source: str, folder: Path, default_name: str) -> Suite:
         name,
         tuple(scenes.values()),
         tuple(detectors) or all_detectors(),
-        tuple(evaluators) or (make_evaluator(DEFAULT),),
+        tuple(evaluators) or (make_evaluator(),),
     )
 
 

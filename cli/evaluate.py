@@ -28,7 +28,7 @@ def evaluate(
             metavar="REFERENCE", help="Reference footprints, or a scene folder (its reference, area and pixel grid)."
         ),
     ],
-    evaluator: EvaluatorOption = "threshold-free",
+    evaluator: EvaluatorOption = None,
     matching: Annotated[
         Literal["nearest", "one-pass", "overlap"] | None,
         typer.Option("--matching", help="How detections and references are matched [nearest]."),
@@ -131,7 +131,7 @@ def evaluate(
         if verdicts is not None:
             from ..reports.verdict_layers import write_verdicts
 
-            write_verdicts(objects, verdicts, crs=truth.crs or found.crs, overwrite=overwrite)
+            write_verdicts(objects, verdicts, overwrite=overwrite)
         if plot is not None:
             from ..reports.figures import save_figure
             from ..reports.verdict_map import verdict_figure

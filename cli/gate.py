@@ -43,7 +43,7 @@ def gate(
         typer.Option(
             "--margin",
             metavar="INDEX=VALUE",
-            help="Difference that counts as none, such as object.quality=0.005; repeat for more.",
+            help="Difference that counts as none, such as pixel.quality=0.005; repeat for more.",
         ),
     ] = None,
     level: Annotated[
@@ -80,7 +80,7 @@ def gate(
     the scenes differ, else 0.
     """
     from ..benchmark.analysis.baseline import Baseline
-    from ..benchmark.analysis.gate import compare, different_scenes, gated_indices, margins_of
+    from ..benchmark.analysis.gate import compare, different_scenes, margins_of
     from ..benchmark.analysis.timing import time_side_by_side
     from ..benchmark.suite import suite_of_words
     from ..core.output import check_target, whole_file
@@ -95,7 +95,7 @@ def gate(
     if against is not None:
         before = before.only([against])
     chosen_evaluator = before.evaluator.evaluator()
-    indices = gated_indices(chosen_evaluator, index)
+    indices = chosen_evaluator.gated_indices(index)
     margins = margins_of(margin or [], indices)
     if candidate is not None:
         if suite is not None or detector or time:

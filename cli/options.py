@@ -104,8 +104,14 @@ DetectorSeedsOption = Annotated[
 ]
 DpiOption = Annotated[int, typer.Option("--dpi", min=30, max=1200, metavar="N", help="Resolution of a PNG, per inch.")]
 EvaluatorOption = Annotated[
-    str,
-    typer.Option("--evaluator", "-e", metavar="EVALUATOR", help=f"{_SELECTION}.", autocompletion=completion.evaluators),
+    str | None,
+    typer.Option(
+        "--evaluator",
+        "-e",
+        metavar="EVALUATOR",
+        help=f"{_SELECTION}; that of the 2010 paper by default.",
+        autocompletion=completion.evaluators,
+    ),
 ]
 EvaluatorsOption = Annotated[
     list[str] | None,

@@ -81,7 +81,7 @@ def plot_scene(
         evaluators = stored_evaluators(opened, rows)
         first = {row.label: row for row in sorted(rows, key=lambda row: -row.seed)}
         chosen = [row for row in rows if first[row.label] is row]
-        view = scene_view(opened, opened.scene(rows[0].scene_id), chosen, evaluators[0].key) if evaluators else None
+        view = scene_view(opened, opened.scene(rows[0].scene_id), chosen, evaluators[0]) if evaluators else None
     if view is None:
         raise ParameterError(f"{store}: {name!r} has no verdicts to draw: it has no reference, or was not evaluated")
     save_plot(overlay_figure(view, window=_placed(window, view.extent)), output, dpi=dpi, overwrite=overwrite)

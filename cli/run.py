@@ -65,7 +65,7 @@ def run(
 
     Exit code 3 when runs failed, 4 when nothing could be measured.
     """
-    from ..benchmark.analysis.leaderboard import make_leaderboard, rank_index, unsuccessful_runs
+    from ..benchmark.analysis.leaderboard import make_leaderboard, unsuccessful_runs
     from ..benchmark.analysis.report_contents import fill_report
     from ..benchmark.execution.runner import run_plan
     from ..benchmark.plan import make_plan, plan_content, suite_from_content
@@ -88,7 +88,7 @@ def run(
             suite = suite.with_seeds(seeds)
         if scenes is not None:
             suite = suite.with_scenes(scenes)
-        rank_index(suite.evaluators[0], index)
+        suite.evaluators[0].ranking_index(index)
         if output is not None and not dry_run:
             _make_folder(output, overwrite)
         plan = make_plan(suite, opened, rerun=rerun, only_failed=retry_failed)

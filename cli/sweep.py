@@ -69,7 +69,7 @@ def sweep(
 
     Exit code 3 when runs failed, 4 when nothing could be measured.
     """
-    from ..benchmark.analysis.leaderboard import rank_index, unsuccessful_runs
+    from ..benchmark.analysis.leaderboard import unsuccessful_runs
     from ..benchmark.analysis.sweep import axis_of, break_downs, make_sweep, run_sweep
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
@@ -88,7 +88,7 @@ def sweep(
         suite = suite.with_seeds(seeds)
     if scenes is not None:
         suite = suite.with_scenes(scenes)
-    shown = rank_index(suite.evaluators[0], index)
+    shown = suite.evaluators[0].ranking_index(index)
     if level is not None and shown.better == "neither":
         raise ParameterError(f"{shown.key} has no better direction, so no level to break down at")
     console = messages(options.quiet)

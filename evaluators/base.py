@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..core.errors import InputError, UnknownNameError
+from ..core.errors import InputError, ParameterError, UnknownNameError
 from ..core.parameters import Parameterised
 from ..core.registry import nearest_hint
 from ..scenes.geodata.footprints import Footprints
@@ -232,23 +232,33 @@ class Evaluator(Parameterised, ABC):
         return found
 
     @classmethod
-    def ranking_index(cls) -> Index:
-        """Return the index that ranks when none is chosen."""
-        if cls.ranked_by:
-            return cls.index(cls.ranked_by)
+    def ranking_index(cls, name: str | None = None) -> Index:
+        """Return the index that ranks: the named one, else the declared one, else the first with a direction."""
+        if name or cls.ranked_by:
+            return cls.index(name or cls.ranked_by)
         return next((index for index in cls.indices if index.better != "neither"), cls.indices[0])
 
     @classmethod
-    def gated_indices(cls) -> tuple[Index, ...]:
-        """Return the indices that are gated when none is chosen."""
-        if cls.gated_by:
-            return tuple(cls.index(key) for key in cls.gated_by)
-        return tuple(index for index in cls.indices if index.main and index.better != "neither")
+    def gated_indices(cls, names: Sequence[str] | None = None) -> tuple[Index, ...]:
+        """Return the indices that are gated: those named, else those declared, else all main ones with a direction.
+
+        Raises
+        ------
+        UnknownNameError, ParameterError
+            An index does not exist, or has no better direction.
+        """
+        if not (names or cls.gated_by):
+            return tuple(index for index in cls.indices if index.main and index.better != "neither")
+        found = tuple(dict.fromkeys(cls.index(name) for name in names or cls.gated_by))
+        for index in found:
+            if index.better == "neither":
+                raise ParameterError(f"{index.key} has no better direction and cannot be gated")
+        return found
 
     @classmethod
-    def swept_indices(cls) -> tuple[Index, ...]:
-        """Return the indices that sensitivity plots show when none is chosen."""
-        return tuple(cls.index(key) for key in cls.swept_by) or (cls.ranking_index(),)
+    def swept_indices(cls, names: Sequence[str] | None = None) -> tuple[Index, ...]:
+        """Return the indices that sensitivity plots show: those named, else those declared, else the one that ranks."""
+        return tuple(dict.fromkeys(cls.index(name) for name in names or cls.swept_by)) or (cls.ranking_index(),)
 
     @classmethod
     def kinds_of(cls, side: Side) -> tuple[VerdictKind, ...]:

@@ -66,6 +66,8 @@ class Index:
         ratio of two run times.
     main : bool
         Whether it is one of the evaluator's principal indices, shown in every table; the others are variants.
+    group : str
+        Heading in tables that it stands under: ``"objects"``; empty for none.
     """
 
     key: str
@@ -78,11 +80,7 @@ class Index:
     range: tuple[float, float] = (0.0, float("inf"))
     formula: Formula = field(default=_undefined, repr=False, compare=False)
     main: bool = True
-
-    @property
-    def group(self) -> str:
-        """The part of the key before the last dot."""
-        return self.key.rpartition(".")[0]
+    group: str = ""
 
 
 def index(
@@ -145,7 +143,10 @@ class IndexGroup:
     @cache
     def indices(cls) -> tuple[Index, ...]:
         """Return the indices of the group, in order of declaration."""
-        return tuple(Index(key=f"{cls.key}.{each.name}", **each.metadata["index"]) for each in dataclasses.fields(cls))
+        return tuple(
+            Index(key=f"{cls.key}.{each.name}", group=cls.title, **each.metadata["index"])
+            for each in dataclasses.fields(cls)
+        )
 
     @classmethod
     def of(cls, tallies: Any) -> Self:

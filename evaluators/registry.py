@@ -23,10 +23,13 @@ EVALUATORS = Registry(
 )
 
 
-def make_evaluator(selection: str | Evaluator, parameters: Mapping[str, Any] | None = None) -> Evaluator:
-    """Return an evaluator by name, by ``name[parameter=value]`` or by ``file.py:Class``; an instance passes through."""
+def make_evaluator(selection: str | Evaluator | None = None, parameters: Mapping[str, Any] | None = None) -> Evaluator:
+    """Return an evaluator by name, by ``name[parameter=value]`` or by ``file.py:Class``.
+
+    An evaluator passes through; None stands for the `DEFAULT` one.
+    """
     if isinstance(selection, Evaluator):
         return selection
-    name, values = parse_selection(selection)
+    name, values = parse_selection(selection or DEFAULT)
     evaluator: Evaluator = EVALUATORS.get(name).build({**values, **(parameters or {})})
     return evaluator

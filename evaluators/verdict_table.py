@@ -312,6 +312,12 @@ class Verdicts:
                 raise InputError(
                     f"{len(table)} verdicts for {len(footprints)} {side}s: they are of another set of footprints"
                 )
+            unknown = set(table.kinds) - {kind.key for kind in self.kinds_of(side)}
+            if unknown:
+                raise InputError(
+                    f"the evaluator does not declare the verdict {min(unknown)!r} of {side}s: evaluate again with "
+                    "'roofbench score'"
+                )
 
     @property
     def sides(self) -> tuple[tuple[Side, VerdictTable, Footprints], ...]:
@@ -321,6 +327,22 @@ class Verdicts:
             ("reference", self.reference_table, self.reference),
         )
 
+    def table(self, side: Side) -> VerdictTable:
+        """Return the table of a side."""
+        return self.detection_table if side == "detection" else self.reference_table
+
+    def footprints(self, side: Side) -> Footprints:
+        """Return the footprints of a side."""
+        return self.detected if side == "detection" else self.reference
+
+    def kinds_of(self, side: Side) -> tuple[VerdictKind, ...]:
+        """Return the verdict kinds of a side, in the order of legends."""
+        return tuple(kind for kind in self.kinds if kind.side == side)
+
+    def mask(self, kind: VerdictKind) -> NDArray[np.bool_]:
+        """Return which objects of the kind's side are of it."""
+        return self.table(kind.side).where(kind.key)
+
     @property
     def crs(self) -> str | None:
         """CRS of the footprints; None where neither side has one."""
@@ -328,11 +350,8 @@ class Verdicts:
 
     def columns(self, side: Side) -> dict[str, NDArray[Any]]:
         """Return the columns of a side without geometry: those of its table, then the footprints' own attributes."""
-        table, footprints = (
-            (self.detection_table, self.detected) if side == "detection" else (self.reference_table, self.reference)
-        )
-        own = table.columns()
-        return own | {name: column for name, column in footprints.attributes.items() if name not in own}
+        own = self.table(side).columns()
+        return own | {name: column for name, column in self.footprints(side).attributes.items() if name not in own}
 
     @cached_property
     def detections(self) -> gpd.GeoDataFrame:
@@ -355,5 +374,4 @@ class Verdicts:
             for name, column in self.columns(side).items()
             if name != "geometry"
         }
-        polygons = self.detected.polygons if side == "detection" else self.reference.polygons
-        return geopandas.GeoDataFrame(columns, geometry=polygons, crs=self.crs)
+        return geopandas.GeoDataFrame(columns, geometry=self.footprints(side).polygons, crs=self.crs)

@@ -51,7 +51,7 @@ def evaluation_table(evaluation: Evaluation, indices: Iterable[Index]) -> Table:
 
 
 def described(evaluation: Evaluation) -> str:
-    """Return the evaluator and its parameters in words: ``threshold-free: matching nearest, area exact``."""
+    """Return the evaluator and its parameters in words: ``NAME: matching nearest, area exact``."""
     how = ", ".join(f"{name} {value}" for name, value in evaluation.evaluator.values().items() if value)
     return f"{evaluation.evaluator.name}: {how}" if how else evaluation.evaluator.name
 

@@ -39,7 +39,6 @@ _MOST_MATRIX_ROWS = 300
 #: Panels in one sensitivity figure.
 _MOST_AXES = 12
 _SYMBOL = re.compile(r"\b([A-Z])_([a-z]{1,2})\b")
-_GROUPS = {"object": "objects", "pixel": "area", "geometric": "geometry"}
 
 
 def html_report(report: Report, *, level: float = 0.8) -> str:
@@ -245,8 +244,7 @@ def _same(cell: Cell, best: float | None) -> bool:
 
 
 def _group_of(index: Index) -> str:
-    head = index.key.partition(".")[0]
-    return _GROUPS.get(head, head)
+    return index.group or index.key.partition(".")[0]
 
 
 def _unit(index: Index) -> str:

@@ -16,9 +16,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ..benchmark.analysis.report_data import Error, Overlay, Report, SceneView, Side
+from ..benchmark.analysis.report_data import Error, Overlay, Report, SceneView
 from ..benchmark.execution.scene_picture import ScenePicture
-from .verdict_map import VERDICT_STYLE
+from ..evaluators.verdict_table import Side, Verdicts
+from .verdict_style import ROLE_STYLE
 
 __all__ = ["data_uri", "path_data", "report_json"]
 
@@ -36,13 +37,41 @@ def report_json(report: Report) -> dict[str, Any]:
     share = _ALL_PICTURES // max(len(report.scenes), 1)
     phrases = _Phrases()
     return {
-        "verdicts": {
-            name: {"colour": colour, "hatched": hatch is not None, "meaning": meaning}
-            for name, (colour, hatch, meaning) in VERDICT_STYLE.items()
-        },
+        **_vocabulary(report),
         "scenes": [_scene(view, min(share, _ONE_PICTURE), phrases) for view in report.scenes],
         "errors": [_error(error, report.scenes[error.scene]) for error in report.errors],
         "phrases": phrases.known(),
+    }
+
+
+def _vocabulary(report: Report) -> dict[str, Any]:
+    """Return the verdict kinds and measures that the evaluator declares, with their colours."""
+    verdicts = next((overlay.verdicts for view in report.scenes for overlay in view.overlays), None)
+    kinds, measures = ((), ()) if verdicts is None else (verdicts.kinds, verdicts.measures)
+    return {
+        "kinds": [
+            {
+                "key": kind.key,
+                "side": f"{kind.side}s",
+                "legend": kind.legend,
+                "colour": ROLE_STYLE[kind.role].colour,
+                "opacity": ROLE_STYLE[kind.role].in_viewer,
+                "hatched": ROLE_STYLE[kind.role].hatch is not None,
+                "filled": kind.role != "outline",
+                "hidden": kind.counts_as == "neutral",
+                "correct": kind.counts_as == "correct",
+                "error": kind.is_error,
+            }
+            for kind in kinds
+        ],
+        "measures": [
+            {
+                "title": measure.title,
+                "unit": {"fraction": "", "m2": "m²", "count": ""}.get(measure.unit, measure.unit),
+                "decimals": measure.decimals,
+            }
+            for measure in measures
+        ],
     }
 
 
@@ -96,9 +125,9 @@ def _scene(view: SceneView, budget: int, phrases: _Phrases) -> dict[str, Any]:
         "height": round(10 * (ymax - ymin)),
         "picture": None if picture is None else data_uri(picture),
         "shows": "" if picture is None else picture.shows,
-        "ids": list(view.ids),
-        "paths": path_data(view.polygons, view.extent),
-        "areas": _rounded(shapely.area(view.polygons), 1),
+        "ids": view.reference.ids.tolist(),
+        "paths": path_data(view.reference.polygons, view.extent),
+        "areas": _rounded(view.reference.areas, 1),
         "border": None if view.area is None else path_data([view.area], view.extent)[0],
         "overlays": [_overlay(overlay, view, phrases) for overlay in view.overlays],
     }
@@ -120,27 +149,27 @@ def _within(picture: ScenePicture, budget: int) -> ScenePicture:
 
 
 def _overlay(overlay: Overlay, view: SceneView, phrases: _Phrases) -> dict[str, Any]:
+    verdicts = overlay.verdicts
     return {
         "label": overlay.label,
         "run": overlay.run,
         "seed": overlay.seed,
-        "ids": list(overlay.ids),
-        "paths": path_data(overlay.polygons, view.extent),
-        "areas": _rounded(shapely.area(overlay.polygons), 1),
-        "detections": _side(overlay.detections, phrases),
-        "references": _side(overlay.references, phrases),
+        "ids": verdicts.detected.ids.tolist(),
+        "paths": path_data(verdicts.detected.polygons, view.extent),
+        "areas": _rounded(verdicts.detected.areas, 1),
+        "detections": _side(verdicts, "detection", phrases),
+        "references": _side(verdicts, "reference", phrases),
     }
 
 
-def _side(side: Side, phrases: _Phrases) -> dict[str, Any]:
+def _side(verdicts: Verdicts, side: Side, phrases: _Phrases) -> dict[str, Any]:
+    table = verdicts.table(side)
+    number = {(kind.side, kind.key): place for place, kind in enumerate(verdicts.kinds)}
     return {
-        "verdicts": list(side.verdicts),
-        "reasons": [phrases.short(reason) for reason in side.reasons],
-        "partners": list(side.partners),
-        "distances": _rounded(side.distances, 2),
-        "overlaps": _rounded(side.overlaps, 1),
-        "ious": _rounded(side.ious, 3),
-        "rmses": _rounded(side.rmses, 2),
+        "verdicts": [number[side, key] for key in table.verdicts.tolist()],
+        "reasons": [phrases.short(reason) for reason in table.reasons],
+        "partners": [None if partner < 0 else partner for partner in table.partner.tolist()],
+        "measures": [_rounded(table.measure(measure.key), measure.decimals) for measure in verdicts.measures],
     }
 
 
@@ -151,7 +180,7 @@ def _rounded(values: NDArray[np.float64], decimals: int) -> list[float | None]:
 def _error(error: Error, view: SceneView) -> dict[str, Any]:
     """Return a card of the gallery: a part of the picture with the object in the middle."""
     overlay = view.overlays[error.overlay]
-    polygons = overlay.polygons if error.side == "detection" else view.polygons
+    polygons = overlay.verdicts.footprints(error.side).polygons
     xmin, ymin, xmax, ymax = shapely.bounds(polygons[error.position])
     width, height = view.extent[2] - view.extent[0], view.extent[3] - view.extent[1]
     longest = max(xmax - xmin, ymax - ymin)

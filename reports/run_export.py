@@ -35,17 +35,16 @@ def export_run(
     row = store.run(run_id)
     if row.status != "ok":
         raise InputError(f"run {run_id} has no footprints to export: its status is {row.status} ({row.reason})")
-    crs = store.scene(row.scene_id).crs
     known = store.evaluators_of(run_id)
     if evaluator is not None and evaluator not in [recipe.use for _, recipe in known]:
         names = ", ".join(recipe.use for _, recipe in known) or "none"
         raise InputError(f"run {run_id} was not evaluated by {evaluator!r} but by {names}")
     for key, recipe in known:
         if evaluator in (None, recipe.use):
-            verdicts = stored_verdicts(store, run_id, key)
+            verdicts = stored_verdicts(store, run_id, recipe.evaluator(), key)
             if verdicts is not None:
-                write_verdicts(verdicts, path, crs=crs, overwrite=overwrite)
-                return f"{len(verdicts.detections)} detections, {len(verdicts.references)} references by {recipe.use}"
+                write_verdicts(verdicts, path, overwrite=overwrite)
+                return f"{len(verdicts.detected)} detections, {len(verdicts.reference)} references by {recipe.use}"
     detected = store.detections(run_id)
     write_footprints(detected, path, layer="detections", overwrite=overwrite)
     return f"{len(detected)} detections"

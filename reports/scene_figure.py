@@ -17,11 +17,12 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image as Bitmap
 
-from ..benchmark.analysis.report_data import Overlay, SceneView, Side
+from ..benchmark.analysis.report_data import Overlay, SceneView
 from ..benchmark.execution.scene_picture import ScenePicture
+from ..evaluators.verdict_table import SIDES, VerdictKind
 from .format import shortened
 from .map_elements import add_scale_bar, polygon_paths
-from .verdict_map import VERDICT_STYLE
+from .verdict_style import ROLE_STYLE, filled_kinds
 
 __all__ = ["overlay_figure"]
 
@@ -48,6 +49,7 @@ def overlay_figure(view: SceneView, *, window: tuple[float, float, float, float]
     for axes in grid.flat:
         axes.set_axis_off()
     for axes, overlay in zip(grid.flat, view.overlays, strict=False):
+        verdicts = overlay.verdicts
         if backdrop is not None:
             left, bottom, right, top = view.extent
             axes.imshow(backdrop, extent=(left, right, bottom, top), interpolation="antialiased")
@@ -56,8 +58,11 @@ def overlay_figure(view: SceneView, *, window: tuple[float, float, float, float]
         axes.set_ylim(ymin, ymax)
         axes.set_aspect("equal")
         add_scale_bar(axes)
-        counts = [f"{_count(overlay.detections, name)} {name}" for name in ("TP", "MD", "FP")]
-        counts.append(f"{_count(overlay.references, 'FN')} FN")
+        counts = [
+            f"{verdicts.table(kind.side).count(kind.key)} {kind.key}"
+            for kind in verdicts.kinds
+            if kind.role not in ("outline", "left out")
+        ]
         axes.set_title(f"{shortened(overlay.label)}: {', '.join(counts)}", fontsize=9, parse_math=False)
     figure.legend(handles=_legend(view), loc="outside lower center", ncols=5, frameon=False, fontsize=9)
     return figure
@@ -73,36 +78,32 @@ def _pale(picture: ScenePicture) -> NDArray[np.float64]:
 
 def _draw(axes: Axes, view: SceneView, overlay: Overlay) -> None:
     axes.add_collection(
-        PathCollection(list(polygon_paths(view.polygons)), facecolor="none", edgecolor="black", linewidth=0.7)
+        PathCollection(list(polygon_paths(view.reference.polygons)), facecolor="none", edgecolor="black", linewidth=0.7)
     )
-    sides: tuple[tuple[Side, Any, tuple[str, ...]], ...] = (
-        (overlay.references, view.polygons, ("FN",)),
-        (overlay.detections, overlay.polygons, ("TP", "MD", "FP")),
-    )
-    for side, polygons, shown in sides:
-        verdicts = np.array(side.verdicts, dtype=object)
-        for verdict in shown:
-            mine = polygons[verdicts == verdict]
-            colour, hatch, _ = VERDICT_STYLE[verdict]
-            face = to_rgba(colour, 0.3 if hatch else 0.5)
-            axes.add_collection(
-                PathCollection(list(polygon_paths(mine)), facecolor=face, edgecolor=colour, hatch=hatch, linewidth=1.0)
-            )
+    for side in reversed(SIDES):
+        for kind in filled_kinds(overlay.verdicts, side):
+            chosen = overlay.verdicts.footprints(side).polygons[overlay.verdicts.mask(kind)]
+            axes.add_collection(PathCollection(list(polygon_paths(chosen)), **_look(kind), linewidth=1.0))
     if view.area is not None and shapely.area(view.area) > 0:
         axes.add_collection(
             PathCollection(list(polygon_paths([view.area])), facecolor="none", edgecolor="#333333", linestyle="--")
         )
 
 
-def _count(side: Side, verdict: str) -> int:
-    return sum(each == verdict for each in side.verdicts)
+def _look(kind: VerdictKind) -> dict[str, Any]:
+    style = ROLE_STYLE[kind.role]
+    return {
+        "facecolor": to_rgba(style.colour, style.on_picture),
+        "edgecolor": style.colour,
+        "hatch": style.hatch,
+    }
 
 
 def _legend(view: SceneView) -> Sequence[Patch]:
     handles = [Patch(facecolor="none", edgecolor="black", label="reference")]
-    for name in ("TP", "MD", "FP", "FN"):
-        colour, hatch, label = VERDICT_STYLE[name]
-        handles.append(
-            Patch(facecolor=to_rgba(colour, 0.3 if hatch else 0.5), edgecolor=colour, hatch=hatch, label=label)
-        )
+    every = [overlay.verdicts for overlay in view.overlays]
+    for kind in every[0].kinds:
+        needed = kind.role != "left out" or any(verdicts.mask(kind).any() for verdicts in every)
+        if kind.role != "outline" and needed:
+            handles.append(Patch(label=kind.legend, **_look(kind)))
     return handles

@@ -68,7 +68,7 @@ def sensitivity_figure(lines: Sequence[Sensitivity], *, level: float | None = No
 
 
 def _named(key: str) -> str:
-    """Return an index key in words: ``object.quality`` becomes ``object quality``."""
+    """Return an index key in words: ``pixel.quality`` becomes ``pixel quality``."""
     return key.replace(".", " ").replace("_", " ")
 
 

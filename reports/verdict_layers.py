@@ -3,53 +3,58 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..evaluators.base import Verdicts
+from ..evaluators.verdict_table import Verdicts
 from ..scenes.geodata.vector_files import write_layers
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 __all__ = ["write_verdicts"]
 
 
-def write_verdicts(
-    verdicts: Verdicts, path: str | os.PathLike[str], *, crs: str | None, overwrite: bool = False
-) -> None:
+def write_verdicts(verdicts: Verdicts, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write one row per object with verdict, partner and reason.
 
     A GeoPackage gets the layers ``detections`` and ``references``; other formats, which hold one layer, get both in
-    one, told apart by the column ``side``.
+    one, distinguished by the column ``side``.
     """
-    sides = {"detections": verdicts.detections, "references": verdicts.references}
-    layers = {name: (_geometries(table), _columns(table)) for name, table in sides.items()}
-    if Path(path).suffix.lower() != ".gpkg":
-        import pandas as pd
+    # GDAL takes a GeoJSON property "id" for the feature's own number, which must be unique.
+    tables = [
+        {"source_id" if name == "id" else name: column for name, column in verdicts.columns(side).items()}
+        for side, _, _ in verdicts.sides
+    ]
+    polygons = [footprints.polygons for _, _, footprints in verdicts.sides]
+    if Path(path).suffix.lower() == ".gpkg":
+        layers = {f"{side}s": (polygons[place], tables[place]) for place, (side, _, _) in enumerate(verdicts.sides)}
+    else:
+        for table, (side, _, footprints) in zip(tables, verdicts.sides, strict=True):
+            table["side"] = np.full(len(footprints), side, dtype=object)
+        names = dict.fromkeys(name for table in tables for name in table)
+        columns = {name: _joined([table.get(name) for table in tables], list(map(len, polygons))) for name in names}
+        layers = {"verdicts": (np.concatenate(polygons), columns)}
+    write_layers(layers, path, crs=verdicts.crs, overwrite=overwrite)
 
-        joined = pd.concat([table.assign(side=name[:-1]) for name, table in sides.items()], ignore_index=True)
-        layers = {"verdicts": (_geometries(joined), _columns(joined))}
-    write_layers(layers, path, crs=crs, overwrite=overwrite)
 
-
-def _geometries(table: pd.DataFrame) -> NDArray[np.object_]:
-    return np.asarray(table["geometry"].to_numpy(), dtype=object)
-
-
-def _columns(table: pd.DataFrame) -> Mapping[str, NDArray[Any]]:
-    columns: dict[str, NDArray[Any]] = {}
-    for name in table.columns.drop("geometry"):
-        column = table[name]
-        # GDAL takes a GeoJSON property "id" for the feature's own number, which must be unique.
-        name = "source_id" if name == "id" else name
-        if str(column.dtype) == "Int64":
-            missing = column.isna().to_numpy()
-            columns[name] = np.ma.masked_array(column.fillna(-1).to_numpy(dtype=np.int64), missing)
+def _joined(columns: Sequence[NDArray[Any] | None], counts: Sequence[int]) -> NDArray[Any]:
+    """Return a column of both sides one below the other; what one side does not have is missing."""
+    kind = next(column.dtype for column in columns if column is not None)
+    if any(column is None for column in columns) and kind.kind not in "iuf":
+        kind = np.dtype(object)
+    parts: list[NDArray[Any]] = []
+    for column, count in zip(columns, counts, strict=True):
+        if column is not None:
+            parts.append(column)
+        elif kind.kind == "f":
+            parts.append(np.full(count, np.nan))
+        elif kind.kind in "iu":
+            parts.append(np.ma.masked_array(np.zeros(count, dtype=kind), mask=True))
         else:
-            columns[name] = column.to_numpy()
-    return columns
+            parts.append(np.full(count, None, dtype=object))
+    joined = np.concatenate([np.ma.getdata(part) for part in parts])
+    if any(map(np.ma.isMaskedArray, parts)):
+        return np.ma.masked_array(joined, np.concatenate([np.ma.getmaskarray(part) for part in parts]))
+    return joined

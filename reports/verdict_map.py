@@ -1,7 +1,4 @@
-"""Maps of verdicts: where the detections are right, where they are wrong, and the indices beside it.
-
-Colours are those of Okabe & Ito, told apart by people who see red and green alike; false negatives are hatched too.
-"""
+"""Maps of verdicts: where the detections are right, where they are wrong, and the indices beside it."""
 
 from __future__ import annotations
 
@@ -16,28 +13,21 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..evaluators.base import Evaluation, Verdicts
+from ..evaluators.base import Evaluation
+from ..evaluators.verdict_table import VerdictKind, Verdicts
 from .evaluation_text import described, evaluation_table
 from .format import shortened
 from .map_elements import add_scale_bar, polygon_paths
+from .verdict_style import ROLE_STYLE, filled_kinds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["VERDICT_STYLE", "draw_verdicts", "verdict_figure"]
-
-#: Verdict to (colour, hatch, what it means).
-VERDICT_STYLE = {
-    "TP": ("#009E73", None, "TP: detected building"),
-    "MD": ("#E69F00", None, "MD: multiple detection"),
-    "FP": ("#D55E00", None, "FP: false alarm"),
-    "FN": ("#0072B2", "////", "FN: missed reference"),
-    "left out": ("#BBBBBB", None, "left out"),
-}
+__all__ = ["draw_verdicts", "verdict_figure"]
 
 
 def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry | None = None) -> Figure:
-    """Return a figure: the map of TP, MD, FP and FN with scale bar and legend, and the index table beside it.
+    """Return a figure: the map of all verdicts with scale bar and legend, and the index table beside it.
 
     Footprints that lie in places far apart get a map for each place (the nine with most objects), since on one map
     of all nothing would be seen.
@@ -68,9 +58,9 @@ def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry
             axes.set_title(f"place {number + 1} of {total}", fontsize=9, loc="left")
         for handle in draw_verdicts(axes, verdicts, extent=extent, area=area):
             handles[str(handle.get_label())] = handle
-    order = {label: place for place, (_, _, label) in enumerate(VERDICT_STYLE.values())}
-    shown = sorted(handles.values(), key=lambda handle: order.get(str(handle.get_label()).partition(" (")[0], 9))
-    if shown:
+    if handles:
+        order = [kind.legend for kind in verdicts.kinds if kind.role != "outline"]
+        shown = sorted(handles.values(), key=lambda handle: _place(str(handle.get_label()), order))
         left.legend(handles=shown, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     _draw_indices(right.subplots(), evaluation)
     return figure
@@ -94,8 +84,7 @@ def draw_verdicts(
     area : polygon, optional
         Evaluation area, drawn dashed.
     """
-    tables = (verdicts.references, verdicts.detections)
-    every = np.concatenate([table["geometry"].to_numpy() for table in tables])
+    every = np.concatenate([footprints.polygons for _, _, footprints in verdicts.sides])
     if area is not None:
         every = np.append(every, area)
     if extent is None and len(every):
@@ -112,22 +101,12 @@ def draw_verdicts(
     axes.set_yticks([])
     handles: list[Patch] = []
     window = shapely.box(*extent)
-    shown = (("reference", ("left out", "FN")), ("detection", ("left out", "TP", "MD", "FP")))
-    for table, (side, groups) in zip(tables, shown, strict=True):
-        for verdict in groups:
-            chosen = table["geometry"].to_numpy()[(table["verdict"] == verdict).to_numpy()]
-            if len(chosen):
-                handles.append(_draw_group(axes, chosen, verdict, window))
-                if verdict == "left out":
-                    handles[-1].set_label(f"{side} {handles[-1].get_label()}")
-    references = verdicts.references
-    matched = references["geometry"].to_numpy()[(references["verdict"] == "TP").to_numpy()]
-    if len(matched):
-        visible = matched[shapely.intersects(matched, window)]
-        axes.add_collection(
-            PathCollection(list(polygon_paths(visible)), facecolor="none", edgecolor="black", linewidth=0.7)
-        )
-        handles.append(Patch(facecolor="none", edgecolor="black", label=f"reference of a TP ({len(matched):,})"))
+    # Detections lie above references, outlines above both.
+    outlined = [kind for kind in verdicts.kinds if kind.role == "outline"]
+    for kind in [*filled_kinds(verdicts, "reference"), *filled_kinds(verdicts, "detection"), *outlined]:
+        chosen = verdicts.footprints(kind.side).polygons[verdicts.mask(kind)]
+        if len(chosen):
+            handles.append(_draw_group(axes, chosen, kind, window))
     if area is not None:
         axes.add_collection(
             PathCollection(
@@ -141,7 +120,7 @@ def draw_verdicts(
 
 def _places(verdicts: Verdicts) -> tuple[list[tuple[float, float, float, float] | None], int]:
     """Return the extents to draw, at most nine, and how many there are: one, unless footprints are too small to see."""
-    every = np.concatenate([verdicts.detections["geometry"].to_numpy(), verdicts.references["geometry"].to_numpy()])
+    every = np.concatenate([footprints.polygons for _, _, footprints in verdicts.sides])
     if not len(every):
         return [None], 1
     xmin, ymin, xmax, ymax = shapely.total_bounds(every)
@@ -163,14 +142,24 @@ def _places(verdicts: Verdicts) -> tuple[list[tuple[float, float, float, float] 
     return list(extents[:9]), len(extents)
 
 
-def _draw_group(axes: Axes, polygons: NDArray[np.object_], verdict: str, window: shapely.Geometry) -> Patch:
-    colour, hatch, label = VERDICT_STYLE[verdict]
-    face = to_rgba(colour, 0.35 if hatch or verdict == "left out" else 0.75)
+def _draw_group(axes: Axes, polygons: NDArray[np.object_], kind: VerdictKind, window: shapely.Geometry) -> Patch:
+    style = ROLE_STYLE[kind.role]
+    look: dict[str, Any] = {
+        "facecolor": "none" if kind.role == "outline" else to_rgba(style.colour, style.on_map),
+        "edgecolor": style.colour,
+        "hatch": style.hatch,
+        "linewidth": 0.7 if kind.role == "outline" else 0.6,
+    }
     visible = polygons[shapely.intersects(polygons, window)]
-    axes.add_collection(
-        PathCollection(list(polygon_paths(visible)), facecolor=face, edgecolor=colour, hatch=hatch, linewidth=0.6)
-    )
-    return Patch(label=f"{label} ({len(polygons):,})", facecolor=face, edgecolor=colour, hatch=hatch, linewidth=0.6)
+    axes.add_collection(PathCollection(list(polygon_paths(visible)), **look))
+    side = f"{kind.side} " if kind.role == "left out" else ""
+    return Patch(label=f"{side}{kind.legend} ({len(polygons):,})", **look)
+
+
+def _place(label: str, order: list[str]) -> int:
+    """Return the place of a legend's entry, whose label ends with a count; entries of no filled kind come last."""
+    text = label.rpartition(" (")[0]
+    return next((place for place, legend in enumerate(order) if text.endswith(legend)), len(order))
 
 
 def _draw_indices(axes: Axes, evaluation: Evaluation) -> None:

@@ -29,12 +29,12 @@ from collections.abc import Mapping, Sequence
 
 from ...core.errors import ParameterError, UnknownNameError
 from ...core.registry import nearest_hint, parse_assignment
-from ...evaluators.base import Evaluator, Index
+from ...evaluators.base import Index
 from .baseline import Baseline, Measured
 from .inference import bootstrap_interval, holm, lowest_p, scenes_needed, sign_flip_p
 from .results import Conclusion, GateResult, IndexConclusion
 
-__all__ = ["GATE_LEVEL", "compare", "different_scenes", "gated_indices", "margins_of", "seeds_share"]
+__all__ = ["GATE_LEVEL", "compare", "different_scenes", "margins_of", "seeds_share"]
 
 #: Of 200 gate runs of an identical detector at most one says `worse`.
 GATE_LEVEL = 0.01
@@ -42,17 +42,8 @@ GATE_LEVEL = 0.01
 DEFAULT_MARGINS = {"fraction": 0.005, "ratio": 0.01, "m": 0.02, "px": 0.1, "count": 0.0}
 
 
-def gated_indices(evaluator: Evaluator, names: Sequence[str] | None = None) -> tuple[Index, ...]:
-    """Return the indices that are gated: those named by key or symbol, else those that the evaluator declares."""
-    chosen = tuple(dict.fromkeys(map(evaluator.index, names or ()))) or evaluator.gated_indices()
-    for index in chosen:
-        if index.better == "neither":
-            raise ParameterError(f"{index.key} has no better direction and cannot be gated")
-    return chosen
-
-
 def margins_of(texts: Sequence[str], indices: Sequence[Index]) -> dict[str, float]:
-    """Return the margin of every gated index: defaults by unit, replaced by ``object.quality=0.005``."""
+    """Return the margin of every gated index: defaults by unit, replaced by ``INDEX=0.005``."""
     margins = {index.key: DEFAULT_MARGINS.get(index.unit, 0.0) for index in indices}
     keys = {name: index.key for index in indices for name in (index.symbol, index.key) if name}
     for text in texts:

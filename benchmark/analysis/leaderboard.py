@@ -27,7 +27,7 @@ from .inference import (
 )
 from .results import Cell, Entry, Leaderboard, UnsuccessfulRun
 
-__all__ = ["make_leaderboard", "rank_index", "repeat_command", "unsuccessful_runs"]
+__all__ = ["make_leaderboard", "repeat_command", "unsuccessful_runs"]
 
 _RESAMPLES = 1000  # of pooled indices, each of which is summarised anew
 
@@ -59,7 +59,7 @@ def make_leaderboard(
     rows = [row for row in rows if row.scene not in bare]
     scenes = tuple(dict.fromkeys(row.scene for row in rows))
     indices = tuple(index for index in keyed.evaluator.indices if index.main)
-    ranking = rank_index(keyed.evaluator, rank_by)
+    ranking = keyed.evaluator.ranking_index(rank_by)
     if ranking.key not in [index.key for index in indices]:
         indices = (*indices, ranking)
     boards = [
@@ -213,11 +213,6 @@ def _groups(boards: Sequence[_Tally], index: Index) -> tuple[dict[str, str], lis
         f"{fewest} scenes, Holm, level {LEVEL:g})"
     )
     return {board.label: letter for board, letter in zip(boards, letters, strict=True)}, [note]
-
-
-def rank_index(evaluator: Evaluator, name: str | None) -> Index:
-    """Return the index of that key or symbol, by default the one that the evaluator declares."""
-    return evaluator.ranking_index() if name is None else evaluator.index(name)
 
 
 def _described(evaluator: Evaluator) -> str:

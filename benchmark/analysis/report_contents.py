@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 
 from ...core.errors import InputError, RoofbenchError
 from ...evaluators.base import Index
+from ...evaluators.registry import DEFAULT
 from ..identity.provenance import code_version
 from ..plan import KeyedEvaluator
 from ..store.records import RunRow
@@ -107,9 +108,9 @@ def fill_report(
     numbers = [row.id for row in good]
     values = store.index_values(numbers, keyed.key)
     drawn = None
-    for other, _ in evaluated:  # the first whose verdicts are of the known kinds
+    for other, _ in evaluated:  # the first whose verdicts are stored
         own = values if other is keyed else store.index_values(numbers, other.key)
-        drawn = drawn or draw_scenes(store, good, other.key, own, _labels(board))
+        drawn = drawn or draw_scenes(store, good, other, own, _labels(board))
     found = [*sensitivities, *stored_sensitivities(good, values, keyed, level=level)]
     return Report(
         title=title,
@@ -121,7 +122,8 @@ def fill_report(
         sampling=() if drawn is None else drawn.sampling,
         sensitivities=tuple(found),
         costs=_costs(store, good, _labels(board)),
-        comparison=_comparison(good, values),
+        # The printed rows are by the default evaluator: another one's figures do not stand beside them.
+        comparison=_comparison(good, values) if keyed.evaluator.name == DEFAULT else None,
         gate=gate,
         provenance=_provenance(store, rows),
     )

@@ -20,12 +20,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from ...evaluators.base import Index
+from ...evaluators.verdict_table import Side, Verdicts
+from ...scenes.geodata.footprints import Footprints
 from ..execution.scene_picture import ScenePicture
 from .break_down import BreakDown
 from .published import Comparison
@@ -40,34 +39,9 @@ __all__ = [
     "SceneView",
     "Sensitivity",
     "SensitivityPoint",
-    "Side",
     "SizeBin",
     "SizeCurve",
 ]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Side:
-    """The verdicts of one side of an evaluation, one entry per object.
-
-    Attributes
-    ----------
-    verdicts : tuple of str
-        TP, MD, FP, FN or ``left out``.
-    reasons : tuple of str
-    partners : tuple of int or None
-        Id on the other side.
-    distances, overlaps, ious, rmses : ndarray, shape (n,)
-        Metres, m2, fraction, metres; NaN where undefined.
-    """
-
-    verdicts: tuple[str, ...]
-    reasons: tuple[str, ...]
-    partners: tuple[int | None, ...]
-    distances: NDArray[np.float64]
-    overlaps: NDArray[np.float64]
-    ious: NDArray[np.float64]
-    rmses: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,20 +53,14 @@ class Overlay:
     label : str
         Detector with changed parameters.
     run, seed : int
-    polygons : ndarray of shapely polygons
-        Detections.
-    ids : tuple of int
-        Of the detections.
-    detections, references : Side
+    verdicts : Verdicts
+        With the footprints of both sides.
     """
 
     label: str
     run: int
     seed: int
-    polygons: NDArray[np.object_]
-    ids: tuple[int, ...]
-    detections: Side
-    references: Side
+    verdicts: Verdicts
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -103,8 +71,7 @@ class SceneView:
     group: str
     extent: tuple[float, float, float, float]
     picture: ScenePicture | None
-    polygons: NDArray[np.object_]
-    ids: tuple[int, ...]
+    reference: Footprints
     area: Any
     overlays: tuple[Overlay, ...]
 
@@ -121,13 +88,13 @@ class Error:
     position : int
         Row among the objects of its side.
     wrong : float
-        Area that is wrong, m2: of a false alarm, a multiple detection or a missed reference its own; of a matched pair
-        what only one of the two covers.
+        Area that is wrong, m2: of an object that counts as an error its own; of a correct detection what only it or
+        its partner covers.
     """
 
     scene: int
     overlay: int
-    side: Literal["detection", "reference"]
+    side: Side
     position: int
     wrong: float
 

@@ -5,23 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
+from ...evaluators.verdict_table import Side, Verdicts
+from ...scenes.geodata.footprints import Footprints
 from ..execution.scene_picture import ScenePicture
+from ..plan import KeyedEvaluator
 from ..store.records import RunRow, StoredScene
+from ..store.stored_verdicts import stored_verdicts
 from ..store.writer import Store
-from .report_data import Error, Overlay, SceneView, Side, SizeBin, SizeCurve
+from .report_data import Error, Overlay, SceneView, SizeBin, SizeCurve
 
 __all__ = ["Drawn", "draw_scenes", "scene_view"]
 
 #: What is drawn at most, so that the page stays small: scenes, detectors on a scene, objects in all overlays together.
 _MOST_SCENES, _MOST_OVERLAYS, _MOST_OBJECTS = 48, 8, 65_000
-#: Verdicts that can be drawn.
-_VERDICTS = {"TP", "MD", "FP", "FN", "left out"}
 #: Runs that sizes are counted over at most.
 _MOST_SIZED = 600
 _ERRORS_PER_DETECTOR, _ERRORS_PER_SCENE, _MOST_ERRORS = 6, 2, 36
@@ -41,19 +41,18 @@ class Drawn:
 def draw_scenes(
     store: Store,
     rows: Sequence[RunRow],
-    key: str,
+    keyed: KeyedEvaluator,
     values: Mapping[int, Mapping[str, float | None]],
     labels: Sequence[str],
 ) -> Drawn | None:
-    """Return what is drawn of good runs; None when their evaluator gives no verdicts of the known kinds.
+    """Return what is drawn of good runs; None when no verdicts of their evaluator are stored.
 
     Parameters
     ----------
     store : Store
     rows : sequence of RunRow
         Of status ``ok``.
-    key : str
-        Of the evaluator.
+    keyed : KeyedEvaluator
     values : mapping of int to mapping
         Index values by run.
     labels : sequence of str
@@ -69,10 +68,10 @@ def draw_scenes(
     for scene_id in order:
         mine = by_scene[scene_id]
         chosen = [mine[label] for label in labels if label in mine][:_MOST_OVERLAYS]
-        view = scene_view(store, store.scene(scene_id), chosen, key)
+        view = scene_view(store, store.scene(scene_id), chosen, keyed)
         if view is None:
             continue
-        count = sum(len(overlay.ids) + len(view.ids) for overlay in view.overlays)
+        count = sum(len(table) for overlay in view.overlays for _, table, _ in overlay.verdicts.sides)
         if views and objects + count > _MOST_OBJECTS:
             break
         objects += count
@@ -97,34 +96,20 @@ def draw_scenes(
     return Drawn(
         scenes=tuple(views),
         errors=_worst(views),
-        sizes=_sizes(store, sized, key, labels),
+        sizes=_sizes(store, sized, keyed, labels),
         sampling=tuple(sampling),
     )
 
 
-def scene_view(store: Store, scene: StoredScene, rows: Iterable[RunRow], key: str) -> SceneView | None:
-    """Return a scene with the overlays of some runs; None without reference or verdicts that can be drawn."""
+def scene_view(store: Store, scene: StoredScene, rows: Iterable[RunRow], keyed: KeyedEvaluator) -> SceneView | None:
+    """Return a scene with the overlays of some runs; None without reference or stored verdicts."""
     if scene.reference is None or scene.extent is None:
         return None
     overlays = []
     for row in rows:
-        sides = store.verdicts(row.id, key)
-        if not {each["verdict"] for side in sides.values() for each in side} <= _VERDICTS:
-            continue
-        detected = store.detections(row.id)
-        if (len(sides["detection"]), len(sides["reference"])) != (len(detected), len(scene.reference)):
-            continue
-        overlays.append(
-            Overlay(
-                label=row.label,
-                run=row.id,
-                seed=row.seed,
-                polygons=detected.polygons,
-                ids=tuple(detected.ids.tolist()),
-                detections=_side(sides["detection"]),
-                references=_side(sides["reference"]),
-            )
-        )
+        verdicts = stored_verdicts(store, row.id, keyed.evaluator, keyed.key, reference=scene.reference)
+        if verdicts is not None:
+            overlays.append(Overlay(label=row.label, run=row.id, seed=row.seed, verdicts=verdicts))
     if not overlays:
         return None
     content = store.scene_picture(scene.id)
@@ -133,26 +118,9 @@ def scene_view(store: Store, scene: StoredScene, rows: Iterable[RunRow], key: st
         group=scene.recipe.group,
         extent=scene.extent,
         picture=None if content is None else ScenePicture.read(content),
-        polygons=scene.reference.polygons,
-        ids=tuple(scene.reference.ids.tolist()),
+        reference=scene.reference,
         area=scene.area,
         overlays=tuple(overlays),
-    )
-
-
-def _side(rows: Sequence[Mapping[str, Any]]) -> Side:
-    def numbers(name: str) -> NDArray[np.float64]:
-        found = [row.get(name) for row in rows]
-        return np.array([math.nan if value is None else value for value in found], dtype=np.float64)
-
-    return Side(
-        verdicts=tuple(row["verdict"] for row in rows),
-        reasons=tuple(row["reason"] for row in rows),
-        partners=tuple(row.get("partner") for row in rows),
-        distances=numbers("distance"),
-        overlaps=numbers("overlap_area"),
-        ious=numbers("iou"),
-        rmses=numbers("rmse"),
     )
 
 
@@ -175,9 +143,8 @@ def _worst(views: Sequence[SceneView]) -> tuple[Error, ...]:
     """Return for each detector the objects with the largest area that is wrong, few of one scene."""
     candidates: dict[str, list[Error]] = {}
     for place, view in enumerate(views):
-        reference_areas = shapely.area(view.polygons)
         for number, overlay in enumerate(view.overlays):
-            wrong = _wrong_areas(overlay, reference_areas)
+            wrong = _wrong_areas(overlay.verdicts)
             found = [
                 Error(scene=place, overlay=number, side=side, position=int(position), wrong=float(areas[position]))
                 for side, areas in wrong.items()
@@ -194,37 +161,40 @@ def _worst(views: Sequence[SceneView]) -> tuple[Error, ...]:
     return tuple(chosen[:_MOST_ERRORS])
 
 
-def _wrong_areas(
-    overlay: Overlay, reference_areas: NDArray[np.float64]
-) -> dict[Literal["detection", "reference"], NDArray[np.float64]]:
+def _wrong_areas(verdicts: Verdicts) -> dict[Side, NDArray[np.float64]]:
     """Return the area that is wrong about each object, m2; a matched pair is booked on its detection."""
-    own = shapely.area(overlay.polygons)
-    verdicts = np.array(overlay.detections.verdicts, dtype=object)
-    shared = np.nan_to_num(overlay.detections.overlaps)
-    ious = overlay.detections.ious
+    wrong = {}
+    for side, table, footprints in verdicts.sides:
+        kinds = verdicts.kinds_of(side)
+        errors = table.where(*(kind.key for kind in kinds if kind.is_error))
+        wrong[side] = np.where(errors, footprints.areas, 0.0)
+    table = verdicts.detection_table
+    shared, iou = np.nan_to_num(table.measure("overlap_area")), table.measure("iou")
     with np.errstate(divide="ignore", invalid="ignore"):
-        differing = np.nan_to_num(shared / ious - shared, posinf=0.0)  # union minus intersection
-    detections = np.where(np.isin(verdicts, ("FP", "MD")), own, np.where(verdicts == "TP", differing, 0.0))
-    missed = np.array(overlay.references.verdicts, dtype=object) == "FN"
-    return {"detection": detections, "reference": np.where(missed, reference_areas, 0.0)}
+        differing = np.nan_to_num(shared / iou - shared, posinf=0.0)  # union minus intersection
+    correct = table.where(*(kind.key for kind in verdicts.kinds_of("detection") if kind.counts_as == "correct"))
+    wrong["detection"] = np.where(correct, differing, wrong["detection"])
+    return wrong
 
 
-def _sizes(store: Store, rows: Sequence[RunRow], key: str, labels: Sequence[str]) -> tuple[SizeCurve, ...]:
+def _sizes(store: Store, rows: Sequence[RunRow], keyed: KeyedEvaluator, labels: Sequence[str]) -> tuple[SizeCurve, ...]:
     """Return the share of right objects by footprint area."""
     shown = labels[:_MOST_OVERLAYS]
     found = {label: np.zeros((2, len(_EDGES) - 1), dtype=np.int64) for label in shown}
     correct = {label: np.zeros((2, len(_EDGES) - 1), dtype=np.int64) for label in shown}
-    areas: dict[int, NDArray[np.float64]] = {}
+    references: dict[int, Footprints | None] = {}
     for row in rows:
         if row.label not in found:
             continue
-        if row.scene_id not in areas:
-            reference = store.scene(row.scene_id).reference
-            areas[row.scene_id] = np.empty(0) if reference is None else reference.areas
-        references, detections = store.verdict_words(row.id, key)
-        if len(references) == len(areas[row.scene_id]):
-            found[row.label] += _binned(areas[row.scene_id], references, wrong="FN")
-        correct[row.label] += _binned(store.detections(row.id).areas, detections, wrong="FP")
+        if row.scene_id not in references:
+            references[row.scene_id] = store.scene(row.scene_id).reference
+        reference = references[row.scene_id]
+        if reference is None:
+            continue
+        verdicts = stored_verdicts(store, row.id, keyed.evaluator, keyed.key, reference=reference)
+        if verdicts is not None:
+            found[row.label] += _binned(verdicts, "reference")
+            correct[row.label] += _binned(verdicts, "detection")
     curves = tuple(
         SizeCurve(label=label, found=_bins(found[label]), correct=_bins(correct[label]))
         for label in shown
@@ -233,14 +203,14 @@ def _sizes(store: Store, rows: Sequence[RunRow], key: str, labels: Sequence[str]
     return curves if any(each.count for curve in curves for each in curve.found) else ()
 
 
-def _binned(areas: NDArray[np.float64], verdicts: Sequence[str], *, wrong: str) -> NDArray[np.int64]:
-    """Return counted and right objects per size; those that are neither TP nor `wrong` are not counted."""
-    words = np.array(verdicts, dtype=object)
-    if len(words) != len(areas):
-        return np.zeros((2, len(_EDGES) - 1), dtype=np.int64)
-    right = words == "TP"
-    counted = right | (words == wrong)
-    return np.array([np.histogram(areas[mask], _EDGES)[0] for mask in (counted, right)], dtype=np.int64)
+def _binned(verdicts: Verdicts, side: Side) -> NDArray[np.int64]:
+    """Return counted and correct objects per size; those that enter no rate are not counted."""
+    table, areas = verdicts.table(side), verdicts.footprints(side).areas
+    kinds = verdicts.kinds_of(side)
+    right, wrong = (
+        table.where(*(kind.key for kind in kinds if kind.counts_as == what)) for what in ("correct", "wrong")
+    )
+    return np.array([np.histogram(areas[mask], _EDGES)[0] for mask in (right | wrong, right)], dtype=np.int64)
 
 
 def _bins(counts: NDArray[np.int64]) -> tuple[SizeBin, ...]:

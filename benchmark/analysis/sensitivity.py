@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.errors import InputError, RoofbenchError
 from ...detectors.registry import make_detector
-from ...evaluators.base import Evaluator, Index
+from ...evaluators.base import Index
 from ...evaluators.registry import make_evaluator
 from ...scenes.synthetic.presets import preset, preset_names
 from ...scenes.synthetic.recipe import SceneParameters
@@ -28,16 +28,11 @@ from .report_data import Sensitivity, SensitivityPoint
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["read_sweep_table", "sensitivity_indices", "stored_sensitivities"]
+__all__ = ["read_sweep_table", "stored_sensitivities"]
 
 _MOST_LINES = 200
 
 Values = Mapping[int, Mapping[str, float | None]]
-
-
-def sensitivity_indices(evaluator: Evaluator, chosen: Sequence[str] = ()) -> tuple[Index, ...]:
-    """Return the indices to plot: those chosen by key or symbol, else those that the evaluator declares."""
-    return tuple(dict.fromkeys(map(evaluator.index, chosen))) or evaluator.swept_indices()
 
 
 def stored_sensitivities(
@@ -55,10 +50,10 @@ def stored_sensitivities(
     level : float
         Value of the first index at which a detector counts as broken down.
     chosen : sequence of str
-        Index keys; by default those that the evaluator declares.
+        Keys or symbols of indices; those that the evaluator declares by default.
     """
     rows = [row for row in rows if row.id in values]
-    indices = sensitivity_indices(keyed.evaluator, chosen)
+    indices = keyed.evaluator.swept_indices(chosen)
     lines = []
     for axis, unit, default, label, by_value in itertools.chain(_scene_axes(rows), _detector_axes(rows)):
         for index in indices:
@@ -103,7 +98,7 @@ def _lines_of(
     table: pd.DataFrame, evaluator: str, detector: str, axis: str, chosen: Sequence[str], level: float
 ) -> list[Sensitivity]:
     lines = []
-    shown = sensitivity_indices(make_evaluator(evaluator), chosen)
+    shown = make_evaluator(evaluator).swept_indices(chosen)
     for index in shown:
         mine = table[table["index"] == index.key]
         points = tuple(

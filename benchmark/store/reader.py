@@ -229,22 +229,6 @@ class StoreReader:
         found = {row["side"]: VerdictTable.from_bytes(row["content"]) for row in self._db.execute(query, (run_id, key))}
         return (found["detection"], found["reference"]) if len(found) == len(SIDES) else None
 
-    def verdict_words(self, run_id: int, key: str) -> tuple[list[str], list[str]]:
-        """Return the verdict of each reference and of each detection, in the order of the objects."""
-        detection, reference = self.verdict_tables(run_id, key) or (None, None)
-        if detection is None or reference is None:
-            return [], []
-        return reference.verdicts.tolist(), detection.verdicts.tolist()
-
-    def verdicts(self, run_id: int, key: str) -> dict[str, list[dict[str, Any]]]:
-        """Return the verdict rows of both sides in the order of the objects, without geometry."""
-        tables = self.verdict_tables(run_id, key)
-        sides: dict[str, list[dict[str, Any]]] = {side: [] for side in SIDES}
-        for side, table in zip(SIDES, tables or (), strict=False):
-            columns = {name: column.tolist() for name, column in table.columns().items()}
-            sides[side] = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        return sides
-
     def evaluators(self) -> list[tuple[str, PluginRecipe]]:
         """Return the key and recipe of every evaluator that has evaluated a run."""
         rows = self._db.execute("SELECT key, evaluator, parameters FROM evaluations GROUP BY key ORDER BY MIN(id)")

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
-from ...evaluators.base import Verdicts
+from ...evaluators.base import Evaluator
+from ...evaluators.verdict_table import Verdicts
+from ...scenes.geodata.footprints import Footprints
 from .writer import Store
 
 __all__ = ["stored_verdicts"]
 
 
-def stored_verdicts(store: Store, run_id: int, key: str) -> Verdicts | None:
-    """Return the verdicts of a run by the evaluator of that key, geometry included; None when it gave none."""
+def stored_verdicts(
+    store: Store, run_id: int, evaluator: Evaluator, key: str, *, reference: Footprints | None = None
+) -> Verdicts | None:
+    """Return the verdicts of a run; None where none are stored.
+
+    Parameters
+    ----------
+    store : Store
+    run_id : int
+    evaluator : Evaluator
+    key : str
+        Of its evaluations in the store.
+    reference : Footprints, optional
+        The scene's reference, where the caller has read it already.
+    """
     tables = store.verdict_tables(run_id, key)
-    reference = store.scene(store.run(run_id).scene_id).reference
+    if tables is not None and reference is None:
+        reference = store.scene(store.run(run_id).scene_id).reference
     if tables is None or reference is None:
         return None
-    evaluator = dict(store.evaluators_of(run_id))[key].evaluator()
     return Verdicts(
         kinds=evaluator.verdict_kinds,
         measures=evaluator.measures,

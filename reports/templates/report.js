@@ -75,12 +75,17 @@ for (const group of document.querySelectorAll(".segmented[data-board]")) {
 
 const UNIT = 0.1; // metres per unit of the drawings
 const DASHES = ["", "7 4", "2 3", "10 3 2 3"];
-const SHOWN = ["TP", "MD", "FP", "FN"];
-const WRONG = ["FP", "FN", "MD"];
+const SIDES = ["detections", "references"];
+// Filled kinds of a side in drawing order: those that are hidden at first, below, then as declared.
+const filled = (side) => data.kinds.map((_, number) => number)
+  .filter((number) => data.kinds[number].filled && data.kinds[number].side === side)
+  .sort((one, two) => data.kinds[two].hidden - data.kinds[one].hidden);
+// Kinds with one key on both sides are switched together.
+const keys = [...new Set(data.kinds.filter((kind) => kind.filled).map((kind) => kind.key))];
 
-function hatch(verdict, colour) {
+function hatch(number, colour) {
   const pattern = shape("pattern", {
-    id: `hatch-${verdict}`, width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)",
+    id: `hatch-${number}`, width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)",
   });
   pattern.append(
     shape("rect", { width: 8, height: 8, fill: colour, "fill-opacity": 0.25 }),
@@ -89,13 +94,19 @@ function hatch(verdict, colour) {
   return pattern;
 }
 
-function paint(path, verdict, dash) {
-  const { colour, hatched } = data.verdicts[verdict];
-  path.setAttribute("fill", hatched ? `url(#hatch-${verdict})` : colour);
-  path.setAttribute("fill-opacity", hatched ? 0.9 : verdict === "TP" ? 0.32 : verdict === "left out" ? 0.2 : 0.55);
+function paint(path, number, dash) {
+  const { colour, hatched, opacity } = data.kinds[number];
+  path.setAttribute("fill", hatched ? `url(#hatch-${number})` : colour);
+  path.setAttribute("fill-opacity", opacity);
   path.setAttribute("stroke", colour);
   path.setAttribute("stroke-width", 2);
   if (dash) path.setAttribute("stroke-dasharray", dash);
+}
+
+function swatchOf(kind) {
+  const swatch = element("span", { class: kind.hatched ? "swatch hatched" : "swatch" });
+  swatch.style.setProperty("--colour", kind.colour);
+  return swatch;
 }
 
 class Viewer {
@@ -107,11 +118,11 @@ class Viewer {
       this.layers[name] = shape("g");
     }
     const definitions = shape("defs");
-    for (const [verdict, style] of Object.entries(data.verdicts)) {
-      if (style.hatched) definitions.append(hatch(verdict, style.colour));
-    }
+    data.kinds.forEach((kind, number) => {
+      if (kind.hatched) definitions.append(hatch(number, kind.colour));
+    });
     this.svg.append(definitions, ...Object.values(this.layers));
-    this.hidden = { overlays: new Set(), verdicts: new Set(["left out"]) };
+    this.hidden = { overlays: new Set(), verdicts: new Set(data.kinds.filter((kind) => kind.hidden).map((kind) => kind.key)) };
     this.labels = null;
     this.pointers = new Map();
     this.listen();
@@ -150,8 +161,8 @@ class Viewer {
     if (scene.border) layers.references.append(shape("path", { d: scene.border, class: "border" }));
     scene.overlays.forEach((overlay, place) => {
       const group = shape("g", { "data-overlay": place });
-      this.append(group, place, "references", scene.paths, overlay.references, ["FN", "left out"]);
-      this.append(group, place, "detections", overlay.paths, overlay.detections, ["left out", ...SHOWN]);
+      this.append(group, place, "references", scene.paths, overlay.references);
+      this.append(group, place, "detections", overlay.paths, overlay.detections);
       layers.shapes.append(group);
     });
     byId("shows").textContent = [scene.shows, `${(scene.width * UNIT).toFixed(0)} × ${(scene.height * UNIT).toFixed(0)} m`]
@@ -160,13 +171,15 @@ class Viewer {
     this.refresh();
   }
 
-  append(group, place, side, paths, rows, wanted) {
-    // One verdict after the other, so that what is wrong lies on top.
-    for (const verdict of wanted) {
+  append(group, place, side, paths, rows) {
+    // One kind after the other, so that what is wrong lies on top.
+    for (const number of filled(side)) {
       paths.forEach((d, position) => {
-        if (rows.verdicts[position] !== verdict) return;
-        const path = shape("path", { d, class: "shape", "data-verdict": verdict, "data-side": side, "data-position": position });
-        paint(path, verdict, DASHES[place % DASHES.length]);
+        if (rows.verdicts[position] !== number) return;
+        const path = shape("path", {
+          d, class: "shape", "data-verdict": data.kinds[number].key, "data-side": side, "data-position": position,
+        });
+        paint(path, number, DASHES[place % DASHES.length]);
         group.append(path);
       });
     }
@@ -187,14 +200,15 @@ class Viewer {
         this.refresh();
       });
       const label = element("span", { class: "text clip", title: overlay.label }, overlay.label);
-      const counts = SHOWN.map((verdict) => this.count(overlay, verdict));
-      const wrong = counts[1] + counts[2] + counts[3];
-      const count = element("span", { class: "count" }, `${counts[0]} right, ${wrong} wrong`);
+      const right = this.total(overlay, (kind) => kind.filled && kind.correct);
+      const wrong = this.total(overlay, (kind) => kind.error);
+      const count = element("span", { class: "count" }, `${right} right, ${wrong} wrong`);
       detectors.append(element("label", { class: "toggle" }, box, element("span", { class: `dash d${place % 4}` }), label, count));
     });
     const verdicts = byId("verdicts");
     verdicts.replaceChildren(element("legend", {}, "Verdicts"));
-    for (const [verdict, style] of Object.entries(data.verdicts)) {
+    for (const verdict of keys) {
+      const kind = data.kinds.find((other) => other.filled && other.key === verdict);
       const there = scene.overlays.some((overlay) => this.count(overlay, verdict));
       if (!there) continue;
       const box = element("input", { type: "checkbox", "data-verdict": verdict });
@@ -203,17 +217,17 @@ class Viewer {
         hidden.verdicts[box.checked ? "delete" : "add"](verdict);
         this.refresh();
       });
-      const swatch = element("span", { class: style.hatched ? "swatch hatched" : "swatch" });
-      swatch.style.setProperty("--colour", style.colour);
-      verdicts.append(element("label", { class: "toggle" }, box, swatch, element("span", { class: "text" }, style.meaning),
+      verdicts.append(element("label", { class: "toggle" }, box, swatchOf(kind), element("span", { class: "text" }, kind.legend),
         element("span", { class: "count", "data-count": verdict })));
     }
   }
 
+  total(overlay, wanted) {
+    return SIDES.reduce((sum, side) => sum + overlay[side].verdicts.filter((number) => wanted(data.kinds[number])).length, 0);
+  }
+
   count(overlay, verdict) {
-    const rows = verdict === "FN" ? overlay.references.verdicts : overlay.detections.verdicts;
-    const all = rows.reduce((sum, other) => sum + (other === verdict), 0);
-    return verdict === "left out" ? all + overlay.references.verdicts.filter((other) => other === verdict).length : all;
+    return this.total(overlay, (kind) => kind.filled && kind.key === verdict);
   }
 
   visible(place, verdict) {
@@ -253,22 +267,17 @@ class Viewer {
     const own = detection ? overlay : scene;
     const other = detection ? scene : overlay;
     const { position } = object;
-    const verdict = rows.verdicts[position];
+    const kind = data.kinds[rows.verdicts[position]];
     const partner = rows.partners[position];
     const mate = partner === null ? -1 : other.ids.indexOf(partner);
     if (mate >= 0) this.outline(other.paths[mate], true);
     this.outline(own.paths[position], false);
 
-    const swatch = element("span", { class: data.verdicts[verdict].hatched ? "swatch hatched" : "swatch" });
-    swatch.style.setProperty("--colour", data.verdicts[verdict].colour);
     const facts = [
       [detection ? "detection" : "reference", `number ${own.ids[position]}`],
       ["area", own.areas[position], "m²", 1],
       [detection ? "nearest reference" : "nearest detection", partner === null ? "none" : `number ${partner}`],
-      ["shared area", rows.overlaps[position], "m²", 1],
-      ["IoU", rows.ious[position], "", 2],
-      ["centre distance", rows.distances[position], "m", 2],
-      ["corner RMSE", rows.rmses[position], "m", 2],
+      ...data.measures.map(({ title, unit, decimals }, number) => [title, rows.measures[number][position], unit, decimals]),
     ];
     const list = element("dl");
     for (const [name, value, unit, digits] of facts) {
@@ -277,7 +286,7 @@ class Viewer {
       list.append(element("dt", {}, name), element("dd", {}, text));
     }
     panel.replaceChildren(
-      element("div", { class: "chip" }, swatch, data.verdicts[verdict].meaning),
+      element("div", { class: "chip" }, swatchOf(kind), kind.legend),
       element("p", { class: "soft small clip", title: overlay.label }, `${overlay.label}, run ${overlay.run}`),
       element("p", { class: "reason" }, reason(rows.reasons[position])),
       list,
@@ -296,8 +305,8 @@ class Viewer {
     const found = [];
     this.scene.overlays.forEach((overlay, place) => {
       for (const [side, own] of [["detections", overlay], ["references", this.scene]]) {
-        overlay[side].verdicts.forEach((verdict, position) => {
-          if (WRONG.includes(verdict) && this.visible(place, verdict)) {
+        overlay[side].verdicts.forEach((number, position) => {
+          if (data.kinds[number].error && this.visible(place, data.kinds[number].key)) {
             found.push({ overlay: place, side, position, area: own.areas[position] });
           }
         });
@@ -467,26 +476,24 @@ function card(error, viewer) {
   const overlay = scene.overlays[error.overlay];
   const side = error.side === "detection" ? "detections" : "references";
   const rows = overlay[side];
-  const verdict = rows.verdicts[error.position];
+  const number = rows.verdicts[error.position];
+  const kind = data.kinds[number];
   const [x, y, size] = error.box;
   const svg = shape("svg", { viewBox: `${x} ${y} ${size} ${size}`, "aria-hidden": "true" });
   if (error.picture) svg.append(shape("image", { href: error.picture, x, y, width: size, height: size }));
   svg.append(shape("path", { d: scene.paths.join(""), class: "known under" }), shape("path", { d: scene.paths.join(""), class: "known" }));
   const path = shape("path", { d: (side === "detections" ? overlay : scene).paths[error.position], class: "shape" });
-  paint(path, verdict, "");
+  paint(path, number, "");
   svg.append(path);
-  const { colour, hatched } = data.verdicts[verdict];
-  const swatch = element("span", { class: hatched ? "swatch hatched" : "swatch" });
-  swatch.style.setProperty("--colour", colour);
   const text = element("span", { class: "text" },
-    element("span", { class: "chip" }, swatch, `${verdict}, ${error.wrong} m² wrong`),
+    element("span", { class: "chip" }, swatchOf(kind), `${kind.key}, ${error.wrong} m² wrong`),
     element("b", { class: "clip", title: overlay.label }, overlay.label),
     element("span", {}, reason(rows.reasons[error.position])),
     element("span", { class: "soft clip", title: scene.name }, scene.name));
   const button = element("button", { class: "worst", type: "button" }, svg, text);
   button.addEventListener("click", () => {
     viewer.labels = new Set([overlay.label]);
-    viewer.hidden.verdicts.delete(verdict);
+    viewer.hidden.verdicts.delete(kind.key);
     viewer.open(error.scene);
     viewer.choose({ overlay: error.overlay, side, position: error.position }, { jump: true });
     byId("scenes").scrollIntoView();

@@ -14,7 +14,6 @@ from roofbench.benchmark.analysis.report_data import (
     SceneView,
     Sensitivity,
     SensitivityPoint,
-    Side,
     SizeBin,
     SizeCurve,
 )
@@ -30,29 +29,8 @@ QUALITY = next(index for index in MAIN if index.key == "object.quality")
 BROKEN = BreakDown(detector="d", axis="scene.slope", index=QUALITY, level=0.8, value=1.0)
 
 
-def side(table):
-    return Side(
-        verdicts=tuple(table["verdict"]),
-        reasons=tuple(table["reason"]),
-        partners=tuple(None if partner < 0 else int(partner) for partner in table["partner"].fillna(-1)),
-        distances=table["distance"].to_numpy(),
-        overlaps=table["overlap_area"].to_numpy(),
-        ious=table["iou"].to_numpy(),
-        rmses=table["rmse"].to_numpy(),
-    )
-
-
 def overlay(label, detected, reference, run):
-    evaluation = rb.evaluate(detected, reference)
-    return Overlay(
-        label=label,
-        run=run,
-        seed=0,
-        polygons=detected.polygons,
-        ids=tuple(detected.ids.tolist()),
-        detections=side(evaluation.verdicts.detections),
-        references=side(evaluation.verdicts.references),
-    )
+    return Overlay(label=label, run=run, seed=0, verdicts=rb.evaluate(detected, reference).verdicts)
 
 
 def view(name, labels, seed):
@@ -71,8 +49,7 @@ def view(name, labels, seed):
         group="hamlet",
         extent=scene.extent,
         picture=scene_picture(scene),
-        polygons=reference.polygons,
-        ids=tuple(reference.ids.tolist()),
+        reference=reference,
         area=None,
         overlays=tuple(
             overlay(label, rb.Footprints.of(polygons, crs=reference.crs), reference, run)
@@ -121,7 +98,7 @@ def make_report(labels=("first", "second"), scenes=("hamlet-1", "hamlet-2"), tit
     bins = (SizeBin(0, 50, 10, 4), SizeBin(50, float("inf"), 20, 19))
     means = [0.9 - 0.1 * value for value in range(4)]
     points = tuple(SensitivityPoint(value, mean, mean - 0.1, mean + 0.05, 5) for value, mean in enumerate(means))
-    alarm = views[0].overlays[0].detections.verdicts.index("FP")
+    alarm = views[0].overlays[0].verdicts.detection_table.verdicts.tolist().index("FP")
     parts = {
         "matrix": {name: dict.fromkeys(labels, 0.5) for name in scenes},
         "scenes": views,

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from roofbench.benchmark.analysis.baseline import Measured
-from roofbench.benchmark.analysis.gate import compare_detector, gated_indices, margins_of
+from roofbench.benchmark.analysis.gate import compare_detector, margins_of
 from roofbench.benchmark.execution.runner import Execution, run_plan
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 from roofbench.benchmark.plan import make_plan
@@ -25,7 +25,7 @@ from roofbench.evaluators.registry import make_evaluator
 
 CANDIDATES, PAIRS, SCENES = 50, 2000, 10
 EVALUATOR = make_evaluator("threshold-free")
-INDICES = gated_indices(EVALUATOR)
+INDICES = EVALUATOR.gated_indices()
 MARGINS = margins_of([], INDICES)
 
 

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 from roofbench.benchmark.analysis.baseline import Measured
-from roofbench.benchmark.analysis.gate import compare_detector, gated_indices, margins_of
+from roofbench.benchmark.analysis.gate import compare_detector, margins_of
 from roofbench.benchmark.identity.recipes import PluginRecipe
 from roofbench.evaluators.registry import make_evaluator
 
@@ -19,7 +19,7 @@ DROPS = (0.0, 0.01, 0.015, 0.02, 0.03, 0.05)
 SPREADS = (0.01, 0.02)
 REPEATS = 200
 
-INDICES = gated_indices(make_evaluator("threshold-free"))
+INDICES = make_evaluator().gated_indices()
 MARGINS = margins_of([], INDICES)
 
 

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from roofbench.benchmark.analysis.baseline import Baseline, BaselineScene, Measured
-from roofbench.benchmark.analysis.gate import compare, different_scenes, gated_indices, margins_of
+from roofbench.benchmark.analysis.gate import compare, different_scenes, margins_of
 from roofbench.benchmark.identity import provenance
 from roofbench.benchmark.identity.provenance import CodeVersion
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
@@ -17,7 +17,7 @@ from roofbench.evaluators.registry import make_evaluator
 from roofbench.reports.gate_text import format_gate
 
 EVALUATOR = make_evaluator("threshold-free")
-INDICES = gated_indices(EVALUATOR)
+INDICES = EVALUATOR.gated_indices()
 MARGINS = margins_of([], INDICES)
 
 
@@ -284,6 +284,10 @@ def test_a_dirty_tree_cannot_become_a_baseline(cli, monkeypatch):
     provenance.code_version.cache_clear()
     with pytest.raises(RoofbenchError, match="uncommitted changes"):
         cli("baseline", "save", "-o", "b.json")
+
+
+def test_every_default_index_exists():
+    assert [index.key for index in INDICES] == list(EVALUATOR.gated_by)
 
 
 def test_run_time_is_compared_side_by_side(monkeypatch, tmp_path, misbehaving):

@@ -31,8 +31,10 @@ def test_every_scene_is_drawn_with_picture_and_every_detector(filled):
         assert view.picture is not None
         assert {overlay.label for overlay in view.overlays} == {"ndsm", "ndsm[height=4]", "ndsm[height=6]"}
         for overlay in view.overlays:
-            assert len(overlay.polygons) == len(overlay.detections.verdicts)
-            assert len(view.polygons) == len(overlay.references.verdicts)
+            assert overlay.verdicts.reference is view.reference
+            assert [len(table) for _, table, _ in overlay.verdicts.sides] == [
+                len(footprints) for _, _, footprints in overlay.verdicts.sides
+            ]
     assert filled.sampling == ()
 
 
@@ -48,16 +50,16 @@ def test_counts_by_size_are_those_of_the_leaderboard(filled):
 def test_the_worst_objects_are_wrong_by_what_their_verdict_says(filled):
     for error in filled.errors:
         view = filled.scenes[error.scene]
-        overlay = view.overlays[error.overlay]
+        verdicts = view.overlays[error.overlay].verdicts
+        table, footprints = verdicts.table(error.side), verdicts.footprints(error.side)
+        own, verdict = footprints.polygons[error.position], table.verdicts[error.position]
         if error.side == "reference":
-            assert overlay.references.verdicts[error.position] == "FN"
-            assert error.wrong == pytest.approx(view.polygons[error.position].area)
-        elif overlay.detections.verdicts[error.position] == "TP":
-            own = overlay.polygons[error.position]
-            partner = view.polygons[view.ids.index(overlay.detections.partners[error.position])]
+            assert verdict == "FN"
+        if verdict == "TP":
+            partner = view.reference.polygons[view.reference.ids.tolist().index(table.partner[error.position])]
             assert error.wrong == pytest.approx(own.symmetric_difference(partner).area)
         else:
-            assert error.wrong == pytest.approx(overlay.polygons[error.position].area)
+            assert error.wrong == pytest.approx(own.area)
 
 
 def test_runs_that_differ_in_one_parameter_make_a_sensitivity_line(filled):
