@@ -23,6 +23,8 @@ def ls(
 ) -> None:
     """List stored runs, the newest first."""
     from ..benchmark.store.listing import list_runs
+    from ..reports.listing_text import format_listing
 
-    for piece in list_runs(store, status=status, detector=detectors, scene=scenes, limit=limit or None, form=form):
-        typer.echo(piece, nl=False)
+    columns: Literal["few", "all"] = "all" if form == "json" else "few"
+    listing = list_runs(store, status=status, detector=detectors, scene=scenes, limit=limit or None, columns=columns)
+    typer.echo(format_listing(listing, form), nl=False)

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from ..evaluators.base import Index
+if TYPE_CHECKING:  # a listing of runs must not wait for numeric libraries
+    from ..evaluators.base import Index
 
 __all__ = [
     "cell_width",
@@ -54,11 +56,11 @@ def number_text(value: float | None, unit: str, *, fine: bool = False, signed: b
     if value is None:
         return ""
     decimals = _FINE.get(unit, 3) if fine else _COARSE.get(unit, 3)
-    # Rounding first and adding zero turns -0.0 into 0.0.
-    scaled = round(value * _SCALES.get(unit, 1.0), decimals) + 0.0
-    if unit == "count":
-        return f"{scaled:+,.0f}" if signed else f"{scaled:,.0f}"
-    return f"{scaled:{'+' if signed else ''}.{decimals}f}"
+    scaled = value * _SCALES.get(unit, 1.0)
+    text = f"{scaled:,.0f}" if unit == "count" else f"{scaled:.{decimals}f}"
+    if text[0] == "-" and not text.strip("-0."):
+        text = text[1:]  # what is rounded to zero has no sign
+    return f"+{text}" if signed and text[0] != "-" else text
 
 
 def unit_text(unit: str) -> str:

@@ -10,7 +10,7 @@ import csv
 import html
 import io
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -71,29 +71,52 @@ class Table:
     def to_text(self, width: int | None = None) -> str:
         """Return aligned columns; where they are wider than `width`, several tables below each other.
 
-        The fixed columns stand in each of these; a left-aligned one that leaves no room for others is cut.
+        The fixed columns are repeated in each of these; a left-aligned one that leaves no room for others is cut.
         """
-        cells = [[one_line(_text(value)) for value in row] for row in self.rows]
-        widths = [
-            max([cell_width(column.title), *(cell_width(row[place]) for row in cells)])
-            for place, column in enumerate(self.columns)
-        ]
+        cells = [_one_line(column) for column in self._cells()]
+        widths = self._widths(cells)
         fixed = [place for place, column in enumerate(self.columns) if column.fixed]
         free = [place for place, column in enumerate(self.columns) if not column.fixed]
         parts = [free]
         if width is not None:
-            self._cut(cells, widths, fixed, free, width)
+            self._cut(cells, fixed, free, width)
+            widths = self._widths(cells)
             parts = [[]]
             for place in free:
                 if parts[-1] and _total(widths, [*fixed, *parts[-1], place]) > width:
                     parts.append([])
                 parts[-1].append(place)
-        return "\n".join(self._part(cells, widths, [*fixed, *part]) for part in parts)
+        return "\n".join(line for part in parts for line in self._lines(cells, widths, [*fixed, *part]))
 
-    def _cut(
-        self, cells: list[list[str]], widths: list[int], fixed: Sequence[int], free: Sequence[int], width: int
-    ) -> None:
+    def _lines(self, cells: list[list[str]], widths: Sequence[int], places: Sequence[int]) -> Iterator[str]:
+        columns = [[self.columns[p].title, "─" * widths[p], *cells[p]] for p in places]
+        aligns = [self.columns[p].align for p in places]
+        if all("".join(cells[p]).isascii() for p in places):
+            # One template for a line: the text of 100 000 lines should appear at once.
+            parts = (
+                f"{{:{'<' if align == 'left' else '>'}{widths[p]}}}" for p, align in zip(places, aligns, strict=True)
+            )
+            line = (" " * _GAP).join(parts).format
+            yield from (line(*row).rstrip() for row in zip(*columns, strict=True))
+            return
+        padded = [_padded(c, widths[p], align) for c, p, align in zip(columns, places, aligns, strict=True)]
+        yield from (line.rstrip() for line in map((" " * _GAP).join, zip(*padded, strict=True)))
+
+    def _cells(self) -> list[list[str]]:
+        """Return the text of the cells, column by column."""
+        if not self.rows:
+            return [[] for _ in self.columns]
+        return [
+            ["" if value is None else value if type(value) is str else str(value) for value in column]
+            for column in zip(*self.rows, strict=True)
+        ]
+
+    def _widths(self, cells: Sequence[Sequence[str]]) -> list[int]:
+        return [_width([column.title, *texts]) for column, texts in zip(self.columns, cells, strict=True)]
+
+    def _cut(self, cells: list[list[str]], fixed: Sequence[int], free: Sequence[int], width: int) -> None:
         """Shorten left-aligned columns, the widest first, until the fixed ones and any other fit."""
+        widths = self._widths(cells)
         others = max((widths[place] for place in free), default=0)
         long = sorted((p for p, c in enumerate(self.columns) if c.align == "left"), key=lambda place: -widths[place])
         for place in long:
@@ -101,34 +124,19 @@ class Table:
             excess += others + _GAP if place in fixed and free else 0
             limit = max(_LEAST, widths[place] - excess)
             if excess > 0 and limit < widths[place]:
-                for row in cells:
-                    row[place] = shortened(row[place], limit)
-                titled = cell_width(self.columns[place].title)
-                widths[place] = max([titled, *(cell_width(row[place]) for row in cells)])
-
-    def _part(self, cells: list[list[str]], widths: Sequence[int], places: Sequence[int]) -> str:
-        lines = [[self.columns[place].title for place in places], ["─" * widths[place] for place in places]]
-        lines += [[row[place] for place in places] for row in cells]
-        aligned = (
-            [_padded(cell, widths[place], self.columns[place].align) for cell, place in zip(line, places, strict=True)]
-            for line in lines
-        )
-        return "\n".join((" " * _GAP).join(line).rstrip() for line in aligned)
+                cells[place] = [shortened(text, limit) for text in cells[place]]
+                widths = self._widths(cells)
 
     def to_markdown(self) -> str:
         """Return a Markdown table; what would be markup in a cell is escaped."""
-        lines = [[escaped_markdown(column.title) for column in self.columns]]
-        lines += [[escaped_markdown(_text(value)) for value in row] for row in self.rows]
-        widths = [max(3, *(cell_width(line[place]) for line in lines)) for place in range(len(self.columns))]
-        rule = [f":{'-' * (w - 1)}" if c.align == "left" else f"{'-' * (w - 1)}:" for c, w in self._with(widths)]
-        padded = [
-            [_padded(cell, width, column.align) for cell, (column, width) in zip(line, self._with(widths), strict=True)]
-            for line in lines
-        ]
-        return "\n".join(f"| {' | '.join(line)} |" for line in [padded[0], rule, *padded[1:]])
-
-    def _with(self, widths: Sequence[int]) -> list[tuple[Column, int]]:
-        return list(zip(self.columns, widths, strict=True))
+        columns = []
+        for column, texts in zip(self.columns, self._cells(), strict=True):
+            cells = [escaped_markdown(text) for text in (column.title, *texts)]
+            width = max(3, _width(cells))
+            rule = f":{'-' * (width - 1)}" if column.align == "left" else f"{'-' * (width - 1)}:"
+            head, *body = _padded(cells, width, column.align)
+            columns.append([head, rule, *body])
+        return "\n".join(f"| {' | '.join(line)} |" for line in zip(*columns, strict=True))
 
     def to_csv(self) -> str:
         """Return CSV with a header; numbers as Python writes them, empty where undefined."""
@@ -155,7 +163,8 @@ class Table:
             return "".join(f'<{tag} style="text-align: {c.align}">{html.escape(text)}</{tag}>' for text, c in cells)
 
         head = line("th", (column.title for column in self.columns))
-        body = "".join(f"<tr>{line('td', map(_text, row))}</tr>" for row in self.rows)
+        rows = zip(*self._cells(), strict=True)
+        body = "".join(f"<tr>{line('td', row)}</tr>" for row in rows)
         return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
@@ -170,13 +179,17 @@ def escaped_markdown(text: str) -> str:
     return one_line(text.replace("<", "&lt;").replace(">", "&gt;"))
 
 
-def _text(value: Value) -> str:
-    return "" if value is None else str(value)
+def _one_line(texts: list[str]) -> list[str]:
+    return texts if "".join(texts).isprintable() else [one_line(text) for text in texts]
 
 
-def _padded(text: str, width: int, align: str) -> str:
-    space = " " * (width - cell_width(text))
-    return text + space if align == "left" else space + text
+def _width(texts: Sequence[str]) -> int:
+    return max(map(len if "".join(texts).isascii() else cell_width, texts), default=0)
+
+
+def _padded(texts: Sequence[str], width: int, align: str) -> list[str]:
+    spaces = [" " * (width - cell_width(text)) for text in texts]
+    return [text + space if align == "left" else space + text for text, space in zip(texts, spaces, strict=True)]
 
 
 def _total(widths: Sequence[int], places: Sequence[int]) -> int:
