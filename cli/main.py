@@ -24,6 +24,7 @@ from .gate import gate
 from .info import info
 from .list import list_names
 from .ls import ls
+from .new import new
 from .report import report
 from .run import run
 from .score import score
@@ -56,6 +57,7 @@ app.add_typer(baseline.app)
 app.command("gate", cls=Command)(gate)
 app.command("list", cls=Command)(list_names)
 app.command("info", cls=Command)(info)
+app.command("new", cls=Command)(new)
 app.command("ls", cls=Command)(ls)
 app.command("why", cls=Command)(why)
 app.command("score", cls=Command)(score)

@@ -1,0 +1,34 @@
+"""``roofbench new``: a detector, evaluator or suite to start from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+__all__ = ["new"]
+
+
+def new(
+    template: Annotated[
+        Literal["detector", "evaluator", "suite"],
+        typer.Argument(metavar="KIND", help="detector, evaluator or suite."),
+    ],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="Lower-case letters and digits, parts separated by _ or -.")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Folder to make [NAME].")
+    ] = None,
+) -> None:
+    """Write a complete working example with a test, a README and a CI workflow.
+
+    Example: roofbench new detector my-detector && cd my-detector && pytest
+    """
+    from ..benchmark.scaffold import write_template
+
+    folder = output or Path(name)
+    for file in write_template(template, name, folder):
+        typer.echo(file)
+    typer.echo(f"Next: cd {folder} && pytest; README.md lists further commands", err=True)

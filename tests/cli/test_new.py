@@ -1,0 +1,70 @@
+"""``roofbench new``: what it writes works as it is."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from harness.command_line import roofbench
+
+import roofbench as rb
+from roofbench.benchmark.scaffold import TEMPLATES, write_template
+from roofbench.core.errors import OutputError, ParameterError
+
+
+@pytest.fixture(params=TEMPLATES)
+def written(request, tmp_path):
+    """Return a template and the folder that it was written to."""
+    name = {"detector": "first-try", "evaluator": "cover", "suite": "my-city"}[request.param]
+    files = roofbench("new", request.param, name, folder=tmp_path).stdout.split()
+    assert sorted(files) == sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
+    return request.param, tmp_path / name
+
+
+def test_its_own_tests_pass(written):
+    _, folder = written
+    environment = {"PYTHONPATH": str(Path(rb.__file__).parents[1]), "PATH": "/usr/bin:/bin", "HOME": str(folder)}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert " passed" in done.stdout
+
+
+def test_its_files_are_complete(written):
+    template, folder = written
+    texts = {path.name: path.read_text(encoding="utf-8") for path in folder.rglob("*") if path.is_file()}
+    assert not [name for name, text in texts.items() if re.search(r"@\w+@", name + text)]
+    (workflow,) = folder.glob(".github/workflows/*.yml")
+    assert "pytest" in workflow.read_text()
+    if template != "suite":
+        project = tomllib.loads(texts["pyproject.toml"])
+        ((name, target),) = project["project"]["entry-points"][f"roofbench.{template}s"].items()
+        module, _, attribute = target.partition(":")
+        assert name == folder.name
+        assert f"class {attribute}(" in texts[f"{module}.py"]
+
+
+def test_a_new_detector_gets_on_the_leaderboard(tmp_path):
+    roofbench("new", "detector", "mine", folder=tmp_path)
+    board = roofbench("run", "hamlet", "-d", "mine/mine.py:Mine", "-j", 0, folder=tmp_path).stdout
+    assert "mine" in board
+
+
+@pytest.mark.parametrize("name", ["Mine", "1st", "my detector", "../mine", "mine.py", ""])
+def test_a_name_that_is_no_name_is_refused(name, tmp_path):
+    with pytest.raises(ParameterError, match="cannot be used as a name"):
+        write_template("detector", name, tmp_path / "folder")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_taken_is_refused(tmp_path):
+    for template, name in (("detector", "ndsm"), ("evaluator", "threshold-free"), ("suite", "quick")):
+        with pytest.raises(ParameterError, match="exists already"):
+            write_template(template, name, tmp_path / name)
+
+
+def test_nothing_is_overwritten(tmp_path):
+    with pytest.raises(OutputError, match="exists already"):
+        write_template("suite", "mine", tmp_path)
