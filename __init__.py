@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .scenes.geodata.points import PointCloud
     from .scenes.geodata.raster import Elevation, Grid, Image
     from .scenes.geodata.vector_files import read_footprints, write_footprints
+    from .scenes.importing.request import ImportRequest
     from .scenes.importing.scene_import import import_scene
     from .scenes.scene import Scene
     from .scenes.synthetic import make_scene
@@ -43,6 +44,7 @@ __all__ = [
     "Footprints",
     "Grid",
     "Image",
+    "ImportRequest",
     "Index",
     "PointCloud",
     "RoofbenchError",

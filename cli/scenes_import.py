@@ -110,33 +110,31 @@ def import_(
     Example: roofbench scenes import tiles/*.laz --crs EPSG:28992 --reference register.gpkg -o delft
     """
     from ..scenes.importing.input_files import expanded, sorted_by_ending
+    from ..scenes.importing.request import ImportRequest
     from ..scenes.importing.scene_import import import_scene
 
     loose_points, loose_images = sorted_by_ending(expanded(files or ()))
+    request = ImportRequest(
+        points=[*expanded(points or ()), *loose_points],
+        ortho=[*expanded(ortho or ()), *loose_images],
+        dem=expanded(dem or ()),
+        reference=reference,
+        area=area,
+        crs=crs,
+        bands=None if bands is None else [band.strip() for band in bands.split(",")],
+        gsd=gsd,
+        dem_cell=dem_cell,
+        ground_filter=ground_filter,
+        building_id=building_id,
+        reference_from_class=reference_from_class,
+        ortho_from_points=ortho_from_points,
+        as_rectangles=as_rectangles,
+        join_gaps=join_gaps,
+        extent=extent,
+        name=name,
+        source=source,
+        licence=licence,
+    )
     with import_progress() as (note, progress):
-        scene = import_scene(
-            output,
-            points=[*expanded(points or ()), *loose_points],
-            ortho=[*expanded(ortho or ()), *loose_images],
-            dem=expanded(dem or ()),
-            reference=reference,
-            area=area,
-            crs=crs,
-            bands=None if bands is None else [band.strip() for band in bands.split(",")],
-            gsd=gsd,
-            dem_cell=dem_cell,
-            ground_filter=ground_filter,
-            building_id=building_id,
-            reference_from_class=reference_from_class,
-            ortho_from_points=ortho_from_points,
-            as_rectangles=as_rectangles,
-            join_gaps=join_gaps,
-            extent=extent,
-            name=name,
-            source=source,
-            licence=licence,
-            overwrite=overwrite,
-            note=None if quiet else note,
-            progress=progress,
-        )
+        scene = import_scene(output, request, overwrite=overwrite, note=None if quiet else note, progress=progress)
     typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.holdings)}")

@@ -23,6 +23,7 @@ HOMES = {
     "Footprints": "scenes.geodata.footprints",
     "Grid": "scenes.geodata.raster",
     "Image": "scenes.geodata.raster",
+    "ImportRequest": "scenes.importing.request",
     "Index": "evaluators.base",
     "PointCloud": "scenes.geodata.points",
     "RoofbenchError": "core.errors",

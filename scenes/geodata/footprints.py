@@ -40,7 +40,7 @@ _UNNUMBERED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class Repair:
-    """One footprint that was mended or left out on the way in.
+    """One footprint that was repaired or left out on the way in.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Repair:
     problem : str
         What was wrong: ``"Self-intersection at (3, 4)"``, ``"empty"``, ``"zero area"``, ``"not a polygon: Point"``.
     action : str
-        ``"mended"`` or ``"left out"``.
+        ``"repaired"`` or ``"left out"``.
     """
 
     id: int
@@ -64,7 +64,7 @@ class Repair:
 class Footprints:
     """A set of footprints with a common CRS.
 
-    Build it by `Footprints.of`, which mends and checks; the constructor takes what is already clean.
+    Build it by `Footprints.of`, which repairs and checks; the constructor takes what is already clean.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Footprints:
     metadata : mapping
         Facts of the whole set that JSON can hold, for instance a sampler's energy trace.
     repairs : tuple of Repair
-        What was mended or left out on the way in.
+        What was repaired or left out on the way in.
     source : str
         File or maker, for messages.
     """
@@ -110,7 +110,7 @@ class Footprints:
         metadata: Mapping[str, Any] | None = None,
         source: str = "footprints",
     ) -> Footprints:
-        """Build from any geometries: mends invalid ones, leaves out unusable ones, and reports both.
+        """Build from any geometries: repairs invalid ones, leaves out unusable ones, and reports both.
 
         Building ids may be numbers or texts; a polygon without one (None, NaN) is its own building.
 
@@ -123,7 +123,7 @@ class Footprints:
         >>> bow_tie = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
         >>> footprints = Footprints.of([bow_tie, shapely.Polygon(), shapely.box(0, 0, 1, 1)])
         >>> len(footprints), [str(repair) for repair in footprints.repairs]
-        (2, ['feature 0: Self-intersection[1 1]: mended', 'feature 1: empty: left out'])
+        (2, ['feature 0: Self-intersection[1 1]: repaired', 'feature 1: empty: left out'])
         """
         geometries = _as_geometry_array(polygons)
         clean, repairs, kept = _mend(geometries)
@@ -328,10 +328,10 @@ def _mend(
         collection = geometries[row].geom_type == "GeometryCollection"
         problem = "a collection of geometries" if collection else shapely.is_valid_reason(geometries[row])
         # "structure" joins overlapping parts; "linework" would make holes where they overlap.
-        mended = shapely.make_valid(geometries[row], method="structure", keep_collapsed=False)
-        geometries[row] = polygonal_part(mended)
+        repaired = shapely.make_valid(geometries[row], method="structure", keep_collapsed=False)
+        geometries[row] = polygonal_part(repaired)
         usable = not geometries[row].is_empty
-        repairs.append(Repair(int(row), problem, "mended" if usable else "left out"))
+        repairs.append(Repair(int(row), problem, "repaired" if usable else "left out"))
         kept[row] = usable
     single = kept & (shapely.get_type_id(geometries) == 6) & (shapely.get_num_geometries(geometries) == 1)
     geometries[single] = shapely.get_geometry(geometries[single], 0)

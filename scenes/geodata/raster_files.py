@@ -39,7 +39,7 @@ __all__ = [
     "write_image",
 ]
 
-#: Names that a band can have; any other in ``--bands`` is refused, ``-`` skips one.
+#: Names that a band can have; any other in ``bands=`` is refused, ``-`` skips one.
 BANDS = ("red", "green", "blue", "nir", "grey")
 _DEFAULT_BANDS = {1: ("grey",), 3: ("red", "green", "blue"), 4: ("red", "green", "blue", "nir")}
 

@@ -252,7 +252,7 @@ def _geometries(wkb: NDArray[np.object_]) -> tuple[NDArray[np.object_], list[Rep
         unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
         for row in unread:
             geometries[row] = shapely.from_wkb(wkb[row], on_invalid="fix")
-            closed.append(Repair(int(row), "a ring that is not closed", "mended"))
+            closed.append(Repair(int(row), "a ring that is not closed", "repaired"))
     return geometries, closed
 
 

@@ -32,8 +32,9 @@ from .filter import fill_unknown, ground_surface
 
 __all__ = ["HIGHEST_LAND", "LOWEST_LAND", "SEAM", "Heights", "heights_of"]
 
-#: Elevations outside these, metres, are not land: markers of missing data, other units, errors.
-LOWEST_LAND, HIGHEST_LAND = -500.0, 9000.0
+#: Elevations outside these, metres, are not land but markers of missing data, other units or errors: the shore of the
+#: Dead Sea and Mount Everest, with room for any zero.
+LOWEST_LAND, HIGHEST_LAND = -1000.0, 10000.0
 #: Width of the seam, metres.
 SEAM = 20.0
 #: A DEM whose border lies less than so many cells inside the extent does not stop short.

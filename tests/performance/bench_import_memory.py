@@ -23,9 +23,11 @@ CASES = {
     "read_points": "from roofbench.scenes.geodata.las_files import read_points; cloud = read_points(FILE)",
     "read_points, window of 1 ha": "from roofbench.scenes.geodata.las_files import read_points; "
     "cloud = read_points(FILE, window=(500100, 5700100, 500200, 5700200))",
-    "import, classified": "import roofbench as rb; rb.import_scene(OUT, points=FILE)",
-    "import, opening filter": "import roofbench as rb; rb.import_scene(OUT, points=FILE, ground_filter='opening')",
-    "import, cloth filter": "import roofbench as rb; rb.import_scene(OUT, points=FILE, ground_filter='cloth')",
+    "import, classified": "import roofbench as rb; rb.import_scene(OUT, rb.ImportRequest(points=FILE))",
+    "import, opening filter": "import roofbench as rb; "
+    "rb.import_scene(OUT, rb.ImportRequest(points=FILE, ground_filter='opening'))",
+    "import, cloth filter": "import roofbench as rb; "
+    "rb.import_scene(OUT, rb.ImportRequest(points=FILE, ground_filter='cloth'))",
 }
 MEASURE = """
 import json, time

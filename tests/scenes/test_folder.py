@@ -114,7 +114,7 @@ def test_a_file_edited_later_is_noticed_and_can_be_sealed(saved, tmp_path):
 def test_an_existing_folder_is_replaced_only_on_request(saved, tmp_path):
     target = tmp_path / "target"
     shutil.copytree(saved, target)
-    with pytest.raises(OutputError, match="exists already: add --overwrite"):
+    with pytest.raises(OutputError, match="exists already: set overwrite=True"):
         rb.save_scene(small_scenes.scene(), target)
     rb.save_scene(small_scenes.scene(dem=None), target, overwrite=True)
     assert not (target / "dem.tif").exists()

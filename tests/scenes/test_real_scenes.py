@@ -8,6 +8,7 @@ import pytest
 import shapely
 
 import roofbench as rb
+from roofbench.scenes.importing.request import ImportRequest
 from roofbench.scenes.importing.scene_import import import_scene
 
 SHARED = Path(os.environ.get("ROOFBENCH_SHARED") or Path(rb.__file__).parent.parent / "shared" / "scenes")
@@ -19,11 +20,13 @@ pytestmark = pytest.mark.skipif(not DELFT.is_dir(), reason="the real scenes are 
 def delft(tmp_path_factory):
     return import_scene(
         tmp_path_factory.mktemp("real") / "delft",
-        points=sorted(DELFT.glob("*.laz")),
-        crs="EPSG:28992",
-        reference=DELFT / "bgt_pand_footprints.gpkg",
-        building_id="identificatiebagpnd",
-        area=DELFT / "evaluation_area.gpkg",
+        ImportRequest(
+            points=sorted(DELFT.glob("*.laz")),
+            crs="EPSG:28992",
+            reference=DELFT / "bgt_pand_footprints.gpkg",
+            building_id="identificatiebagpnd",
+            area=DELFT / "evaluation_area.gpkg",
+        ),
     )
 
 
@@ -31,9 +34,11 @@ def delft(tmp_path_factory):
 def ign(tmp_path_factory):
     return import_scene(
         tmp_path_factory.mktemp("real") / "ign",
-        points=sorted(IGN.glob("*.laz")),
-        reference=IGN / "reference_from_class.gpkg",
-        ortho_from_points=True,
+        ImportRequest(
+            points=sorted(IGN.glob("*.laz")),
+            reference=IGN / "reference_from_class.gpkg",
+            ortho_from_points=True,
+        ),
     )
 
 
@@ -97,7 +102,8 @@ def test_a_published_raster_of_the_same_points_has_the_same_place(ign):
 
 def test_the_outlines_of_class_6_are_where_the_register_has_buildings(delft, tmp_path):
     derived = import_scene(
-        tmp_path / "derived", points=sorted(DELFT.glob("*.laz")), crs="EPSG:28992", reference_from_class=True
+        tmp_path / "derived",
+        ImportRequest(points=sorted(DELFT.glob("*.laz")), crs="EPSG:28992", reference_from_class=True),
     )
     assert "traced around the points of class 6" in derived.facts["derived"]["reference"]
     ours = shapely.intersection(shapely.union_all(derived.reference.polygons), delft.area)

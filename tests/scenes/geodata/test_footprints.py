@@ -34,13 +34,13 @@ def test_sound_polygons_pass_unchanged():
         (Point(1, 2), "not a polygon: Point: left out"),
         (LineString([(0, 0), (1, 1)]), "not a polygon: LineString: left out"),
         (GeometryCollection([Point(0, 0), LineString([(0, 0), (1, 1)])]), "a collection of geometries: left out"),
-        (GeometryCollection([box(0, 0, 1, 1), Point(5, 5)]), "a collection of geometries: mended"),
+        (GeometryCollection([box(0, 0, 1, 1), Point(5, 5)]), "a collection of geometries: repaired"),
         (Polygon([(0, 0), (1, np.inf), (1, 1)]), "coordinates that are not finite: left out"),
         (Polygon([(0, 0), (1e300, 0), (1e300, 1e300)]), "coordinates that are not finite: left out"),
         (Polygon([(0, 0), (1, 1), (2, 2)]), "Self-intersection[1 1]: left out"),
-        (BOW_TIE, "Self-intersection[1 1]: mended"),
-        (Polygon([(0, 0), (4, 0), (4, 4)], [[(9, 9), (10, 9), (10, 10)]]), "Hole lies outside shell[9 9]: mended"),
-        (MultiPolygon([box(0, 0, 2, 2), box(1, 1, 3, 3)]), "Self-intersection[1 2]: mended"),
+        (BOW_TIE, "Self-intersection[1 1]: repaired"),
+        (Polygon([(0, 0), (4, 0), (4, 4)], [[(9, 9), (10, 9), (10, 10)]]), "Hole lies outside shell[9 9]: repaired"),
+        (MultiPolygon([box(0, 0, 2, 2), box(1, 1, 3, 3)]), "Self-intersection[1 2]: repaired"),
     ],
 )
 def test_what_is_not_usable_is_told(geometry, told):

@@ -187,7 +187,7 @@ def test_a_path_without_a_layer_has_none():
 # Odd geometry and odd labels in files
 
 
-def test_bad_geometry_is_mended_or_left_out_by_row(geojson):
+def test_bad_geometry_is_repaired_or_left_out_by_row(geojson):
     footprints = rb.read_footprints(
         geojson(
             ({"type": "Polygon", "coordinates": [RING[:-1]]}, {}),
@@ -201,7 +201,7 @@ def test_bad_geometry_is_mended_or_left_out_by_row(geojson):
     )
     assert footprints.ids.tolist() == [0, 6]
     told = [str(repair) for repair in footprints.repairs]
-    assert told[0] == "feature 0: a ring that is not closed: mended"
+    assert told[0] == "feature 0: a ring that is not closed: repaired"
     assert [repair.id for repair in footprints.repairs] == [0, 1, 2, 3, 4, 5]
     assert all(repair.action == "left out" for repair in footprints.repairs[1:])
 

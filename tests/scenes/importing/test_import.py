@@ -15,6 +15,7 @@ from rasterio import Affine
 import roofbench as rb
 from roofbench.scenes.geodata.las_files import read_las_header, read_points, write_points
 from roofbench.scenes.geodata.raster_files import write_elevation, write_image
+from roofbench.scenes.importing.request import ImportRequest
 from roofbench.scenes.importing.scene_import import import_scene
 
 CRS, WEST, SOUTH = small_scenes.CRS, small_scenes.WEST, small_scenes.SOUTH
@@ -143,7 +144,7 @@ def test_a_dem_is_derived_by_a_cloth_on_request(files, bring):
 
 def test_the_dem_of_a_slope_is_not_shifted(tmp_path):
     write_points(small_scenes.cloud(60_000, slope=0.5), tmp_path / "slope.laz", crs=CRS)
-    dem = import_scene(tmp_path / "out", points=tmp_path / "slope.laz").dem
+    dem = import_scene(tmp_path / "out", ImportRequest(points=tmp_path / "slope.laz")).dem
     truth = small_scenes.cloud(2000, seed=9, slope=0.5)
     ground = truth.classification == 2
     off = truth.z[ground] - dem.sample(truth.x[ground], truth.y[ground])
@@ -251,7 +252,7 @@ def test_a_reference_in_degrees_is_transformed(files, bring):
     assert shapely.hausdorff_distance(scene.reference.polygons, reference.polygons).max() < 0.01
 
 
-def test_footprints_that_need_it_are_mended_and_reported(files, bring):
+def test_footprints_that_need_it_are_repaired_and_reported(files, bring):
     bow_tie = shapely.Polygon(
         [(WEST + 1, SOUTH + 1), (WEST + 9, SOUTH + 9), (WEST + 9, SOUTH + 1), (WEST + 1, SOUTH + 9)]
     )
@@ -261,7 +262,7 @@ def test_footprints_that_need_it_are_mended_and_reported(files, bring):
     (files / "odd.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     code, _, err = bring("points.laz", "--reference", "odd.geojson")
     assert code == 0
-    assert "odd.geojson: 2 footprints were mended or left out (feature 0: Self-intersection" in err
+    assert "odd.geojson: 2 footprints were repaired or left out (feature 0: Self-intersection" in err
     assert "feature 1: " in err
     assert len(rb.open_scene(files / "out").reference) == 2
 

@@ -1,0 +1,52 @@
+"""The orthoimage of a scene: a mosaic of files, or rastered from coloured points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...core.errors import InputError
+from ..geodata.points import PointCloud
+from ..geodata.raster import Image
+from ..geodata.raster_files import RasterHeader, looks_like_values
+from ..geodata.raster_mosaic import mosaic_image
+from .place import Place, extent_text, file_names, file_paths
+from .raster_layer import check_size, grid_of, note_resampling
+
+__all__ = ["image_of", "image_of_points"]
+
+
+def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, bands: Sequence[str] | None) -> Image:
+    """Return the mosaic of orthoimages on the cells of the first, or on cells of `gsd` metres."""
+    grid = grid_of(place, images[0], gsd)
+    check_size(place, grid.gsd, "gsd")
+    note_resampling(place, images, grid)
+    image = mosaic_image(images, grid, crs=place.crs, bands=bands)
+    if bands is None and (marked := [header.path for header in images if looks_like_values(header)]):
+        place.log.note(
+            f"{file_names(marked)}: the last band is marked as alpha and was taken for the mask, but holds many "
+            "values: if it is near infrared, name the bands: red,green,blue,nir"
+        )
+    if image.valid is not None and not image.valid.any():
+        raise InputError(
+            f"{file_paths([header.path for header in images])} has no data in {extent_text(place.extent)}: image and "
+            "points do not overlap"
+        )
+    return _with_gaps_noted(place, image)
+
+
+def image_of_points(place: Place, points: PointCloud, gsd: float | None, files: Sequence[Path]) -> Image:
+    """Return the orthoimage that coloured points give."""
+    from .coloured_points import image_from_points
+
+    check_size(place, gsd or 0.1, "gsd")
+    image = image_from_points(points, place.extent, gsd=gsd, source=file_paths(files))
+    how = place.log.derived["image"] = f"rastered from the colours of the points, at {image.grid.gsd:g} m"
+    place.log.note(f"the orthoimage was {how}")
+    return _with_gaps_noted(place, image)
+
+
+def _with_gaps_noted(place: Place, image: Image) -> Image:
+    if image.valid is not None:
+        place.log.note(f"{1 - image.valid.mean():.1%} of the orthoimage has no data")
+    return image
