@@ -302,7 +302,7 @@ def save(figure, name):
     from PIL import Image as Picture
 
     for dpi in (110, 100, 90, 75):
-        figure.savefig(IMAGES / name, dpi=dpi)
+        figure.savefig(IMAGES / name, dpi=dpi, bbox_inches="tight")
         with Picture.open(IMAGES / name) as picture:
             few = picture.convert("RGB").quantize(256, method=Picture.Quantize.MAXCOVERAGE, dither=Picture.Dither.NONE)
             few.save(IMAGES / name, optimize=True)
