@@ -78,12 +78,10 @@ def run(
     if resume and words:
         raise ParameterError("resume=True continues the last run of the store: leave out the suite and scenes")
     console = messages(options.quiet)
+    # Read before the store is made: a suite with an error leaves no file behind.
+    asked = None if resume else suite_of_words(words, detector, evaluator, seeds=detector_seeds)
     with Store(options.store, must_exist=resume) as opened:
-        suite = (
-            suite_from_content(opened.last_plan())
-            if resume
-            else suite_of_words(words, detector, evaluator, seeds=detector_seeds)
-        )
+        suite = asked or suite_from_content(opened.last_plan())
         if seeds is not None:
             suite = suite.with_seeds(seeds)
         if scenes is not None:

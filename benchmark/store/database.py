@@ -37,6 +37,9 @@ def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
     name = f"{path.resolve().as_uri()}?immutable=1" if sealed else path
     try:
         db = sqlite3.connect(name, timeout=_BUSY_SECONDS, isolation_level=None, uri=sealed)
+    except sqlite3.OperationalError as error:
+        raise OutputError(f"{path} cannot be opened as results store: {error}") from error
+    try:
         db.execute(f"PRAGMA busy_timeout = {_BUSY_SECONDS * 1000}")
         db.row_factory = sqlite3.Row
         prepare(db, path)
@@ -45,8 +48,11 @@ def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
         db.execute("PRAGMA journal_mode = WAL")
         db.execute("PRAGMA synchronous = NORMAL")
         db.execute("PRAGMA foreign_keys = ON")
-    except sqlite3.OperationalError as error:
-        raise OutputError(f"{path} cannot be opened as results store: {error}") from error
+    except BaseException as error:
+        db.close()
+        if isinstance(error, sqlite3.OperationalError):
+            raise OutputError(f"{path} cannot be opened as results store: {error}") from error
+        raise
     return db
 
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import datetime
 import os
+import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -34,6 +35,8 @@ __all__ = ["LasHeader", "read_las_header", "read_points", "write_points"]
 
 #: Name under which point files are written.
 _SOFTWARE = "roofbench"
+#: Length of the longest header (LAS 1.4), bytes.
+_HEADER_BYTES = 375
 #: Points unpacked at a time; about 100 MB with the scaled coordinates.
 CHUNK = 1_000_000
 #: GeoTIFF codes of linear units that are not metres, in the GeoKeys of LAS up to 1.3.
@@ -265,11 +268,12 @@ def _opened(file: Path) -> Iterator[Any]:
     if not file.is_file():
         raise InputError(f"{file} is a folder: name LAS, LAZ or COPC files, for instance {file}/*.laz")
     with file.open("rb") as stream:
-        signature = stream.read(4)
-    if signature != b"LASF":
+        head = stream.read(_HEADER_BYTES)
+    if head[:4] != b"LASF":
         raise InputError(
-            f"{file} is not a LAS file: it begins with {signature!r} instead of b'LASF'; give LAS, LAZ or COPC files"
+            f"{file} is not a LAS file: it begins with {head[:4]!r} instead of b'LASF'; give LAS, LAZ or COPC files"
         )
+    _refuse_record_counts(file, head)
     try:
         with laspy.open(file) as reader:
             yield reader
@@ -280,6 +284,20 @@ def _opened(file: Path) -> Iterator[Any]:
         if "not supported" in reason:
             raise InputError(f"{file} cannot be read ({reason}): write it anew, for instance with laszip") from error
         raise InputError(f"{file} is truncated or broken ({reason}): copy or download it again") from error
+
+
+def _refuse_record_counts(file: Path, head: bytes) -> None:
+    """Refuse a header that announces more records than the file can hold, since laspy would try to read them all."""
+    size = file.stat().st_size
+    counts = [(*struct.unpack_from("<I", head, 100), 54)] if len(head) >= 104 else []
+    if len(head) == _HEADER_BYTES and head[25] >= 4:
+        counts.append((*struct.unpack_from("<I", head, 243), 60))
+    for count, least_bytes in counts:
+        if count * least_bytes > size:
+            raise InputError(
+                f"{file} is truncated or broken (its header announces {count} records of variable length in {size} "
+                "bytes): copy or download it again"
+            )
 
 
 def _refuse_cut_off(file: Path, header: Any) -> None:

@@ -231,7 +231,10 @@ def _read_ogr(
         if layer is not None and layer not in names:
             raise InputError(f"{file} has no layer {layer!r}{nearest_hint(layer, names)}; it has {', '.join(names)}")
         with _quiet():
-            meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0])
+            try:
+                meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0])
+            except UnicodeDecodeError:  # text that is not in the encoding which the file names: any byte is a letter
+                meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0], encoding="ISO-8859-1")
     except (DataSourceError, DataLayerError) as error:
         reason = " ".join(str(error).partition("; It might help")[0].split())
         raise InputError(f"{file} cannot be read as a vector file: {reason}") from error

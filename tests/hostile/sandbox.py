@@ -1,0 +1,140 @@
+"""Run ``roofbench ARGUMENTS`` in a process of its own, with limits, some hundred times a minute.
+
+A server imports roofbench once and forks for every call. A call that crashes, hangs or takes too much memory ends alone
+and is reported: with its exit code or signal, both streams, its duration and its peak memory.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["Outcome", "Sandbox"]
+
+#: A call that takes longer hangs, s; one that takes more memory is not bounded, bytes.
+MOST_SECONDS = 10.0
+MOST_MEMORY = 6 << 30
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a call ended: `code` is negative for a signal; `hung` when it was stopped for its time."""
+
+    code: int
+    hung: bool
+    stdout: str
+    stderr: str
+    seconds: float
+    peak_memory: int
+
+
+class Sandbox:
+    """A server process and the folder of its calls."""
+
+    def __init__(self) -> None:
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "NUMBA_NUM_THREADS": "1"}
+        self._server = subprocess.Popen(
+            [sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
+
+    def run(self, *arguments: object, folder: Path) -> Outcome:
+        assert self._server.stdin is not None
+        assert self._server.stdout is not None
+        request = {"arguments": [str(argument) for argument in arguments], "folder": str(folder)}
+        self._server.stdin.write(json.dumps(request) + "\n")
+        self._server.stdin.flush()
+        return Outcome(**json.loads(self._server.stdout.readline()))
+
+    def close(self) -> None:
+        assert self._server.stdin is not None
+        assert self._server.stdout is not None
+        self._server.stdin.close()
+        self._server.wait(timeout=30)
+        self._server.stdout.close()
+
+
+def _call(arguments: list[str], streams: list[int]) -> None:
+    """Become a process that runs the command line; never returns."""
+    import gc
+    import resource
+    import traceback
+
+    from roofbench.cli.main import main
+
+    code = 70
+    try:
+        os.setpgid(0, 0)
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+        for number, stream in enumerate(streams, start=1):
+            os.dup2(stream, number)
+        sys.stdout, sys.stderr = (os.fdopen(os.dup(number), "w", errors="backslashreplace") for number in (1, 2))
+        sys.argv = ["roofbench", *arguments]
+        try:
+            main()
+            code = 0
+        except SystemExit as leaving:
+            code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
+        gc.collect()  # closes what the end of the interpreter would close
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            try:
+                stream.flush()
+            except (OSError, ValueError):
+                code = code or 70
+        os._exit(code)
+
+
+def _serve() -> None:
+    import signal
+    import tempfile
+    import time
+    import warnings
+
+    import geopandas  # noqa: F401
+    import laspy  # noqa: F401
+    import pyarrow  # noqa: F401
+    import pyogrio  # noqa: F401
+    import rasterio  # noqa: F401
+    import scipy.ndimage  # noqa: F401
+
+    import roofbench
+
+    for name in roofbench.__all__:
+        getattr(roofbench, name)
+    warnings.filterwarnings("ignore", message=".*multi-threaded.*fork", category=DeprecationWarning)
+    for line in sys.stdin:
+        request = json.loads(line)
+        with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
+            os.chdir(request["folder"])
+            start = time.monotonic()
+            child = os.fork()
+            if not child:
+                _call(request["arguments"], [stdout.fileno(), stderr.fileno()])
+            hung = False
+            while True:
+                ended, status, usage = os.wait4(child, os.WNOHANG)
+                if ended:
+                    break
+                if not hung and time.monotonic() - start > MOST_SECONDS:
+                    hung = True
+                    os.kill(child, signal.SIGKILL)
+                time.sleep(0.005)
+            seconds = time.monotonic() - start
+            texts = []
+            for stream in (stdout, stderr):
+                stream.seek(0)
+                texts.append(stream.read().decode(errors="backslashreplace"))
+        code = os.waitstatus_to_exitcode(status)
+        memory = usage.ru_maxrss * 1024
+        outcome = Outcome(code, hung, texts[0], texts[1], seconds, memory)
+        print(json.dumps(outcome.__dict__), flush=True)
+
+
+if __name__ == "__main__":
+    _serve()
