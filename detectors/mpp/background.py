@@ -36,7 +36,7 @@ from ...core.kernels import kernel
 from .cells import HIGH, LOW, Cells
 from .rectangles import row_span
 from .tables import MILLI
-from .workers import ALONE, Workers
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["Background", "estimate_background", "fitted_cells", "restrain", "score_cells", "textures"]
 
@@ -85,13 +85,13 @@ class Background:
 
 
 def textures(
-    height: NDArray[np.int32], state: NDArray[np.uint8], openness: NDArray[np.uint8], *, workers: Workers = ALONE
+    height: NDArray[np.int32], state: NDArray[np.uint8], openness: NDArray[np.uint8], *, threads: Threads = ONE_THREAD
 ) -> NDArray[np.int16]:
     """Return the bin of the texture of each cell, -1 where no window holds it: shape (rows, columns)."""
     rows = state.shape[0]
     windows, bins = np.empty(state.shape, dtype=np.int16), np.empty(state.shape, dtype=np.int16)
-    workers.bands(lambda first, last: _describe_windows(height, state, openness, first, last, windows), rows)
-    workers.bands(lambda first, last: _choose_windows(windows, state, first, last, bins), rows)
+    threads.bands(lambda first, last: _describe_windows(height, state, openness, first, last, windows), rows)
+    threads.bands(lambda first, last: _choose_windows(windows, state, first, last, bins), rows)
     return bins
 
 
@@ -172,10 +172,10 @@ def _log_likelihoods(
     ]
 
 
-def estimate_background(cells: Cells, *, workers: Workers = ALONE) -> tuple[Background, NDArray[np.int16]]:
+def estimate_background(cells: Cells, *, threads: Threads = ONE_THREAD) -> tuple[Background, NDArray[np.int16]]:
     """Estimate the classes of a scene; also return the bin of each cell's texture (-1: no window holds it)."""
-    bins = textures(cells.height, cells.state, cells.openness, workers=workers)
-    tally = np.sum(workers.bands(lambda first, last: _tally(bins, cells.height, first, last), len(bins)), axis=0)
+    bins = textures(cells.height, cells.state, cells.openness, threads=threads)
+    tally = np.sum(threads.bands(lambda first, last: _tally(bins, cells.height, first, last), len(bins)), axis=0)
     counts = tally[:, 0].astype(np.float64).reshape(_ROUGH_BINS, _OPEN_BINS)
     rough = _LOG_LOW + (np.arange(_ROUGH_BINS) + 0.5) * (_LOG_HIGH - _LOG_LOW) / _ROUGH_BINS
     size_of_sample = int(counts.sum())
@@ -227,7 +227,7 @@ def fitted_cells(
     *,
     texture_weight: float,
     texture_limit: float,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> NDArray[np.bool_]:
     """Return which cells take part in the fit of a roof: high ones whose texture does not speak against one.
 
@@ -242,11 +242,11 @@ def fitted_cells(
     background : Background
     texture_weight, texture_limit : float
         As for `score_cells`.
-    workers : Workers
+    threads : Threads
     """
     evidence, thin = _evidence(background, texture_weight, texture_limit), texture_weight * _THIN
     fitted = np.empty(bins.shape, dtype=np.bool_)
-    workers.bands(lambda first, last: _choose_fitted(cells.state, bins, evidence, thin, first, last, fitted), len(bins))
+    threads.bands(lambda first, last: _choose_fitted(cells.state, bins, evidence, thin, first, last, fitted), len(bins))
     return fitted
 
 
@@ -272,7 +272,7 @@ def score_cells(
     texture_limit: float,
     low_price: float,
     void_price: float,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> NDArray[np.int16]:
     """Return the score of each cell in thousandths of a nat.
 
@@ -289,7 +289,7 @@ def score_cells(
         bound of its absolute value, nats.
     low_price, void_price : float
         Nats that a low and a void cell cost.
-    workers : Workers
+    threads : Threads
     """
     evidence = _evidence(background, texture_weight, texture_limit)
     score, modest = np.empty(bins.shape, dtype=np.int16), np.empty(bins.shape, dtype=np.int16)
@@ -299,9 +299,9 @@ def score_cells(
     def work(first: int, last: int) -> None:
         _score(cells.height, cells.state, bins, evidence, crowns, fit_weight, prices, first, last, score)
 
-    workers.bands(work, len(bins))
+    threads.bands(work, len(bins))
     reach = max(1, round(_AROUND / cells.grid.gsd))
-    workers.bands(lambda first, last: restrain(score, cells.state, reach, first, last, modest), len(bins))
+    threads.bands(lambda first, last: restrain(score, cells.state, reach, first, last, modest), len(bins))
     return modest
 
 

@@ -9,13 +9,14 @@ reborn, so the boxes lie in a grid of buckets no narrower than a kernel: only 3 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from .arrays import Floats, Integers, RandomState, Rectangles
 from .random_stream import uniform
+from .windows import Window
 
 __all__ = ["Births", "birth_density", "make_births", "propose_birth"]
 
@@ -30,7 +31,7 @@ class Births(NamedTuple):
     ----------
     share : float
         Of the kernels; 0 for uniform births alone.
-    window : ndarray, shape (4,)
+    edges : ndarray, shape (4,)
         x0, y0, x1, y1 in cells: where centres may lie.
     sides : ndarray, shape (2,)
         Least and largest side in cells.
@@ -47,38 +48,29 @@ class Births(NamedTuple):
     """
 
     share: float
-    window: NDArray[np.float64]
-    sides: NDArray[np.float64]
-    boxes: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    steps: NDArray[np.float64]
-    starts: NDArray[np.int64]
-    buckets: NDArray[np.int64]
-    origin: NDArray[np.float64]
+    edges: Floats
+    sides: Floats
+    boxes: Rectangles
+    weights: Floats
+    steps: Floats
+    starts: Integers
+    buckets: Integers
+    origin: Floats
 
 
-def make_births(
-    window: tuple[float, float, float, float],
-    sides: tuple[float, float],
-    boxes: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    share: float,
-) -> Births:
+def make_births(window: Window, boxes: Rectangles, weights: Floats, share: float) -> Births:
     """Build the proposal of a window; boxes whose kernel cannot reach it are left out.
 
     Parameters
     ----------
-    window : tuple of float
-        x0, y0, x1, y1 in cells.
-    sides : tuple of float
-        Least and largest side in cells.
+    window : Window
     boxes : ndarray, shape (n, 5)
     weights : ndarray, shape (n,)
         Positive; scaled to sum up to 1.
     share : float
         Share of births from kernels, less than 1; 0 where no box is left.
     """
-    x0, y0, x1, y1 = window
+    x0, y0, x1, y1 = window.edges.tolist()
     near = (boxes[:, 0] > x0) & (boxes[:, 0] < x1) & (boxes[:, 1] > y0) & (boxes[:, 1] < y1)
     boxes, weights = boxes[near], weights[near]
     width = max(2 * KERNEL_SHIFT, math.sqrt((x1 - x0) * (y1 - y0)) / 64)
@@ -91,8 +83,8 @@ def make_births(
     weights = weights / total if total > 0 else weights
     return Births(
         share if len(boxes) else 0.0,
-        np.array(window, dtype=np.float64),
-        np.array(sides, dtype=np.float64),
+        window.edges,
+        np.array([window.model.least_side, window.model.largest_side]),
         np.ascontiguousarray(boxes, dtype=np.float64).reshape(-1, 5),
         np.ascontiguousarray(weights, dtype=np.float64),
         np.cumsum(weights),
@@ -103,11 +95,11 @@ def make_births(
 
 
 @kernel
-def propose_birth(births, state, rectangle):  # type: ignore[no-untyped-def]
+def propose_birth(births: Births, state: RandomState, rectangle: Rectangles) -> None:
     """Draw a rectangle from q; its centre or sides may fall outside what is allowed, where the target is 0."""
     least, largest = births.sides[0], births.sides[1]
     if uniform(state) >= births.share:
-        w = births.window
+        w = births.edges
         rectangle[0] = w[0] + uniform(state) * (w[2] - w[0])
         rectangle[1] = w[1] + uniform(state) * (w[3] - w[1])
         rectangle[2] = least + uniform(state) * (largest - least)
@@ -124,13 +116,13 @@ def propose_birth(births, state, rectangle):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def birth_density(births, rectangle):  # type: ignore[no-untyped-def]
+def birth_density(births: Births, rectangle: Rectangles) -> float:
     """Return q of a rectangle, per cells^4 and radian."""
-    w = births.window
+    w = births.edges
     span = births.sides[1] - births.sides[0]
     density = (1.0 - births.share) / ((w[2] - w[0]) * (w[3] - w[1]) * span * span * math.pi)
     if births.share == 0.0:
-        return density
+        return float(density)
     width = births.origin[2]
     row, column = int((rectangle[1] - births.origin[1]) / width), int((rectangle[0] - births.origin[0]) / width)
     rows, columns = births.buckets[0], births.buckets[1]
@@ -149,9 +141,4 @@ def birth_density(births, rectangle):  # type: ignore[no-untyped-def]
             if abs(math.log(rectangle[2] / box[2])) > KERNEL_SIDE or abs(math.log(rectangle[3] / box[3])) > KERNEL_SIDE:
                 continue
             total += births.weights[i]
-    return density + births.share * total / (volume * rectangle[2] * rectangle[3])
-
-
-def no_births(window: tuple[float, float, float, float], sides: tuple[float, float]) -> Any:
-    """Return uniform births alone."""
-    return make_births(window, sides, np.empty((0, 5)), np.empty(0), 0.0)
+    return float(density + births.share * total / (volume * rectangle[2] * rectangle[3]))

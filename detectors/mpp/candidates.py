@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from .patches import cells_of_patches, label_patches
-from .workers import ALONE, Workers
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["propose_boxes"]
 
@@ -42,7 +42,7 @@ def propose_boxes(
     *,
     steps: tuple[float, ...],
     least_cells: int,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> NDArray[np.float64]:
     """Return boxes of the patches of several step limits, shape (n, 5), without doubles.
 
@@ -56,12 +56,12 @@ def propose_boxes(
         Limits in metres, rising.
     least_cells : int
         Smaller patches and pieces are left out.
-    workers : Workers
+    threads : Threads
     """
     boxes, finer = [np.empty((0, 5))], np.zeros((1, 1), dtype=np.int32)
     for step in steps:
-        labels, count = label_patches(height, roof, round(100 * step), workers=workers)
-        boxes += _boxes_of_patches(labels, count, finer, least_cells, workers)
+        labels, count = label_patches(height, roof, round(100 * step), threads=threads)
+        boxes += _boxes_of_patches(labels, count, finer, least_cells, threads)
         finer = labels
     together = np.concatenate(boxes)
     rounded = np.round(together, 3)
@@ -72,14 +72,14 @@ def propose_boxes(
 
 
 def _boxes_of_patches(
-    labels: NDArray[np.int32], count: int, finer: NDArray[np.int32], least_cells: int, workers: Workers
+    labels: NDArray[np.int32], count: int, finer: NDArray[np.int32], least_cells: int, threads: Threads
 ) -> list[NDArray[np.float64]]:
-    cells, starts = cells_of_patches(labels, count, workers=workers)
+    cells, starts = cells_of_patches(labels, count, threads=threads)
 
     def work(part: tuple[int, int]) -> NDArray[np.float64]:
         return _boxes(cells, starts, *part, finer, least_cells, labels.shape)  # type: ignore[no-any-return]
 
-    return workers.map(work, workers.ranges(np.diff(starts)))
+    return threads.map(work, threads.ranges(np.diff(starts)))
 
 
 @kernel

@@ -32,7 +32,7 @@ from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
 from ...scenes.geodata.sampling import bilinear_at
-from .workers import ALONE, Workers
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["FEWEST_POINTS", "HIGH", "LOW", "VOID", "Cells", "cell_size", "has_points", "make_cells"]
 
@@ -77,7 +77,7 @@ def has_points(z: NDArray[np.float64]) -> bool:
 
 
 def cell_size(
-    x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequence[float], *, workers: Workers = ALONE
+    x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequence[float], *, threads: Threads = ONE_THREAD
 ) -> float:
     """Return the cell size in metres for a mean point spacing: 0.5 to 2 m in steps of 0.25.
 
@@ -86,8 +86,8 @@ def cell_size(
     4 m without a point do not count as covered (water, a ragged border).
     """
     coarse = Grid.covering(extent, 4.0)
-    edges = [len(x) * part // workers.count for part in range(workers.count + 1)]
-    found = workers.map(lambda part: point_counts(x[slice(*part)], y[slice(*part)], coarse), pairwise(edges))
+    edges = [len(x) * part // threads.count for part in range(threads.count + 1)]
+    found = threads.map(lambda part: point_counts(x[slice(*part)], y[slice(*part)], coarse), pairwise(edges))
     spacing = spacing_of_counts(np.sum(found, axis=0), coarse.gsd)
     return 1.0 if spacing is None else min(max(math.ceil(2 * spacing + 0.8) / 4, 0.5), 2.0)
 
@@ -98,7 +98,7 @@ def make_cells(
     grid: Grid,
     *,
     low: float,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> Cells:
     """Sort the points into cells.
 
@@ -112,7 +112,7 @@ def make_cells(
         Working grid.
     low : float
         Low limit in metres above ground.
-    workers : Workers
+    threads : Threads
     """
     size = grid.rows * grid.columns
     counts, tops = np.empty((size, 4), dtype=np.int32), np.empty((size, 2), dtype=np.int32)
@@ -136,10 +136,10 @@ def make_cells(
         _summarise(counts, tops, first, last, height, state, openness)
 
     # Every band goes through all points: no more bands than threads.
-    workers.bands(work, grid.rows, each=1)
-    workers.bands(lambda first, last: _despike(height, state, first, last, other), grid.rows)
-    workers.bands(lambda first, last: _fill(height, openness, other, first, last, state), grid.rows)
-    workers.bands(lambda first, last: _fill(height, openness, state, first, last, other), grid.rows)
+    threads.bands(work, grid.rows, each=1)
+    threads.bands(lambda first, last: _despike(height, state, first, last, other), grid.rows)
+    threads.bands(lambda first, last: _fill(height, openness, other, first, last, state), grid.rows)
+    threads.bands(lambda first, last: _fill(height, openness, state, first, last, other), grid.rows)
     return Cells(grid, height, other, openness)
 
 

@@ -1,4 +1,4 @@
-"""The whole scene: every tile annealed, the seams polished, the traces of all tiles added up."""
+"""The whole scene: every tile annealed, a local search along the seams, the traces of all tiles added up."""
 
 from __future__ import annotations
 
@@ -7,23 +7,22 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from .annealing import Annealed, Schedule, anneal
-from .moves import MOVES
+from .annealing import Annealed, Schedule, anneal, search
+from .arrays import Floats, Rectangles
+from .moves import Move
 from .parameters import MPPParameters
-from .polish import polish
 from .preparation import Prepared
 from .random_stream import stream
 from .rectangles import corners
-from .strips import take_in_strips
+from .sampler import ChainSchedule, Trace
+from .strips import absorb_strips
+from .threads import Threads
 from .tiles import Tile, tiles_of, work_off
 from .walls import close_walls
-from .workers import Workers
+from .windows import Window
 
 __all__ = ["join_traces", "sample_city", "total_energy"]
-
-_Rectangles = NDArray[np.float64]
 
 #: First and last temperature of the chain.
 _HOT, _COLD = 3.0, 0.1
@@ -33,72 +32,71 @@ _INTENSITY = 200.0
 _JUMP_SHARE, _SPLIT_SHARE, _DATA_BIRTHS = 0.3, 0.1, 0.9
 #: Metres between the centres of two buildings that may merge.
 _MERGE_REACH = 20.0
+#: Proposals at effort 1, per square metre and per box.
+_PER_AREA, _PER_BOX = 0.2, 60
+#: Rows of a trace.
+_ROWS = 100
+#: Along the seams: local-search sweeps at most, and buildings that a window may hold besides those that are there.
+_SEAM_SWEEPS, _SEAM_ROOM = 4, 64
+#: Share of the energy of a rectangle by which an edge that closes a wall may raise it.
+_WALL_TOLERANCE = 0.25
 
 
 def sample_city(
-    parameters: MPPParameters, prepared: Prepared, seed: int, workers: Workers
-) -> tuple[_Rectangles, list[Annealed]]:
-    """Anneal every tile, then polish the seams, close the walls and take in what is no building by itself."""
+    parameters: MPPParameters, prepared: Prepared, seed: int, threads: Threads
+) -> tuple[Rectangles, list[Annealed]]:
+    """Anneal every tile, then search along the seams, close the walls and absorb what is no building by itself."""
     grid, model, tables = prepared.grid, prepared.model, prepared.tables
     size = max(parameters.tile, 2.0 * parameters.largest_side)
     reach = math.sqrt(2.0) * model.largest_side
     results: dict[tuple[int, int], Annealed] = {}
 
-    def annealed(tile: Tile, own: _Rectangles, fixed: _Rectangles) -> _Rectangles:
-        inside = tile.owns(prepared.boxes)
-        result = anneal(
-            tables,
-            model,
-            tile.window,
-            prepared.boxes[inside],
-            prepared.weights[inside],
-            prepared.energies[inside],
-            own,
-            _within_reach(fixed, tile, model.largest_side),
-            stream([seed, tile.column % 2**32, tile.row % 2**32]),
-            _schedule(parameters, tile, grid.gsd, int(np.count_nonzero(inside))),
-        )
+    def window_of(tile: Tile, fixed: Rectangles) -> Window:
+        return Window(tables, model, np.array(tile.window), _within_reach(fixed, tile, model.largest_side))
+
+    def annealed(tile: Tile, own: Rectangles, fixed: Rectangles) -> Rectangles:
+        boxes = prepared.boxes.take(tile.owns(prepared.boxes.rectangles))
+        state = stream([seed, tile.column % 2**32, tile.row % 2**32])
+        schedule = _schedule(parameters, tile, grid.gsd, len(boxes))
+        result = anneal(window_of(tile, fixed), boxes, own, schedule, state)
         results[tile.column, tile.row] = result
         return result.rectangles
 
-    def mended(tile: Tile, own: _Rectangles, fixed: _Rectangles) -> _Rectangles:
-        inside = tile.owns(prepared.boxes)
-        boxes, energies = prepared.boxes[inside], prepared.energies[inside]
-        fixed = _within_reach(fixed, tile, model.largest_side)
-        window = np.array(tile.window)
-        sweeps = min(parameters.sweeps, 4)
-        best, _ = polish(tables.small, tables.large, model, window, own, fixed, boxes, energies, len(own) + 64, sweeps)
-        return best  # type: ignore[no-any-return]
+    def searched(tile: Tile, own: Rectangles, fixed: Rectangles) -> Rectangles:
+        boxes = prepared.boxes.take(tile.owns(prepared.boxes.rectangles))
+        sweeps = min(parameters.sweeps, _SEAM_SWEEPS)
+        return search(window_of(tile, fixed), own, boxes, capacity=len(own) + _SEAM_ROOM, sweeps=sweeps)
 
     tiles = tiles_of(grid, size)
-    rectangles = work_off(tiles, np.empty((0, 5)), annealed, reach=reach, workers=workers)
+    rectangles = work_off(tiles, np.empty((0, 5)), annealed, reach=reach, threads=threads)
     if len(tiles) > 1:
-        rectangles = work_off(tiles_of(grid, size, shifted=True), rectangles, mended, reach=reach, workers=workers)
+        rectangles = work_off(tiles_of(grid, size, shifted=True), rectangles, searched, reach=reach, threads=threads)
     rectangles = np.ascontiguousarray(rectangles[np.lexsort(rectangles.T)])
-    close_walls(tables.small, tables.large, model, rectangles, 0.25 * parameters.price)
-    rectangles = take_in_strips(tables, model, rectangles, slender=parameters.slender, part_share=parameters.part_share)
+    close_walls(tables, model, rectangles, _WALL_TOLERANCE * parameters.price)
+    rectangles = absorb_strips(tables, model, rectangles, slender=parameters.slender, part_share=parameters.part_share)
     return rectangles, [results[key] for key in sorted(results)]
 
 
 def _schedule(parameters: MPPParameters, tile: Tile, cell: float, boxes: int) -> Schedule:
-    """Return how the chain of a tile is run: proposals by its area, and for each box."""
+    """Return how a tile is worked on: proposals by its area, and for each box."""
     x0, y0, x1, y1 = tile.window
     area = (x1 - x0) * (y1 - y0) * cell * cell
-    return Schedule(
-        proposals=max(int(parameters.effort * (0.2 * area + 60 * boxes)), 1),
+    proposals = max(int(parameters.effort * (_PER_AREA * area + _PER_BOX * boxes)), 1)
+    chain = ChainSchedule(
+        proposals=proposals,
         hot=_HOT,
         cold=_COLD,
         intensity=_INTENSITY * 1e-6 * cell * cell,
         jump_share=_JUMP_SHARE,
         split_share=_SPLIT_SHARE,
-        data_share=_DATA_BIRTHS,
         merge_reach=_MERGE_REACH / cell,
-        greedy=parameters.start == "greedy",
-        sweeps=parameters.sweeps,
+        stride=max(proposals // _ROWS, 1),
     )
+    greedy = parameters.start == "greedy"
+    return Schedule(chain=chain, data_share=_DATA_BIRTHS, greedy=greedy, sweeps=parameters.sweeps)
 
 
-def _within_reach(fixed: _Rectangles, tile: Tile, largest: float) -> _Rectangles:
+def _within_reach(fixed: Rectangles, tile: Tile, largest: float) -> Rectangles:
     """Return the fixed buildings that one centred in the tile can overlap."""
     x0, y0, x1, y1 = tile.window
     x, y = fixed[:, 0], fixed[:, 1]
@@ -106,7 +104,7 @@ def _within_reach(fixed: _Rectangles, tile: Tile, largest: float) -> _Rectangles
     return fixed[apart < 0.5 * (np.hypot(fixed[:, 2], fixed[:, 3]) + math.sqrt(2.0) * largest)]
 
 
-def total_energy(prepared: Prepared, rectangles: _Rectangles, energies: NDArray[np.float64]) -> float:
+def total_energy(prepared: Prepared, rectangles: Rectangles, energies: Floats) -> float:
     """Return U of a whole scene from the energies of its buildings by themselves."""
     polygons = shapely.polygons(corners(rectangles))
     first, second = shapely.STRtree(polygons).query(polygons, predicate="intersects")
@@ -115,7 +113,7 @@ def total_energy(prepared: Prepared, rectangles: _Rectangles, energies: NDArray[
     return float(energies.sum() + prepared.model.overlap * common)
 
 
-def join_traces(results: list[Annealed], rows: int = 100) -> dict[str, Any]:
+def join_traces(results: list[Annealed], rows: int = _ROWS) -> dict[str, Any]:
     """Add up the traces of all tiles at equal shares of their schedules.
 
     Every tile runs the same schedule on its own number of proposals, so that the temperature at a share is the same.
@@ -124,17 +122,17 @@ def join_traces(results: list[Annealed], rows: int = 100) -> dict[str, Any]:
     if not results:
         return {}
     rows = min(rows, max(len(result.trace) for result in results))
-    total = np.zeros((rows, results[0].trace.shape[1]))
+    total = np.zeros((rows, Trace.COLUMNS))
     for result in results:
         trace = result.trace.copy()
-        trace[:, 4:] = np.cumsum(trace[:, 4:], axis=0)
+        trace[:, Trace.TRIED :] = np.cumsum(trace[:, Trace.TRIED :], axis=0)
         total += trace[-(-np.arange(1, rows + 1) * len(trace) // rows) - 1]
-    total[1:, 4:] -= total[:-1, 4:].copy()
+    total[1:, Trace.TRIED :] -= total[:-1, Trace.TRIED :].copy()
     return {
-        "proposals": total[:, 0].tolist(),
-        "temperature": (total[:, 1] / len(results)).tolist(),
-        "energy": total[:, 2].tolist(),
-        "buildings": total[:, 3].tolist(),
-        "tried": {move: total[:, 4 + k].tolist() for k, move in enumerate(MOVES)},
-        "accepted": {move: total[:, 12 + k].tolist() for k, move in enumerate(MOVES)},
+        "proposals": total[:, Trace.PROPOSALS].tolist(),
+        "temperature": (total[:, Trace.TEMPERATURE] / len(results)).tolist(),
+        "energy": total[:, Trace.ENERGY].tolist(),
+        "buildings": total[:, Trace.BUILDINGS].tolist(),
+        "tried": {move.name.lower(): total[:, Trace.TRIED + move].tolist() for move in Move},
+        "accepted": {move.name.lower(): total[:, Trace.ACCEPTED + move].tolist() for move in Move},
     }

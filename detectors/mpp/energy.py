@@ -15,8 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.kernels import kernel
+from .arrays import Floats, Rectangles
+from .rectangle_sums import scan
 from .rectangles import overlap_area
-from .roofs import choose_roof, log_likelihood, scan
+from .roofs import RoofRules, choose_roof, log_likelihood
+from .tables import Tables
 
 __all__ = [
     "Model",
@@ -25,8 +28,8 @@ __all__ = [
     "ground_variance",
     "least_energy",
     "overlaps",
-    "own_energies",
-    "own_energy",
+    "rectangle_energies",
+    "rectangle_energy",
 ]
 
 
@@ -49,6 +52,10 @@ class Model(NamedTuple):
         Nats per cell off the grid.
     least_side, largest_side : float
         Cells.
+    fit_weight : float
+        Share of the likelihood of heights that counts.
+    ground_error : float
+        Error of the ground height, metres per metre of the longest side.
     """
 
     weight: float
@@ -64,72 +71,69 @@ class Model(NamedTuple):
     fit_weight: float
     ground_error: float
 
+    @property
+    def roof_rules(self) -> RoofRules:
+        """How roofs are chosen (kernels make the same from the fields)."""
+        share = self.weight * self.fit_weight
+        price = self.roof_price / share if share > 0 else math.inf
+        return RoofRules(price, self.least_tau, self.least_height, self.cell)
+
 
 @kernel
-def ground_variance(rectangle, model):  # type: ignore[no-untyped-def]
+def ground_variance(rectangle: Rectangles, model: Model) -> float:
     """Return the variance of heights, m2, that the unknown ground under a rectangle explains."""
-    return (max(rectangle[2], rectangle[3]) * model.cell * model.ground_error) ** 2
+    return float((max(rectangle[2], rectangle[3]) * model.cell * model.ground_error) ** 2)
 
 
 @kernel
-def own_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def]
+def rectangle_energy(tables: Tables, rectangle: Rectangles, model: Model) -> float:
     """Return the energy of a rectangle by itself."""
-    return energy_below(small, large, rectangle, model, np.inf)
+    return float(energy_below(tables, rectangle, model, np.inf))
 
 
 @kernel
-def own_energies(small, large, rectangles, model):  # type: ignore[no-untyped-def]
+def rectangle_energies(tables: Tables, rectangles: Rectangles, model: Model) -> Floats:
     """Return the energy of each rectangle by itself, shape (n,)."""
     energies = np.empty(len(rectangles))
     for i in range(len(rectangles)):
-        energies[i] = own_energy(small, large, rectangles[i], model)
+        energies[i] = rectangle_energy(tables, rectangles[i], model)
     return energies
 
 
 @kernel
-def energy_below(small, large, rectangle, model, limit):  # type: ignore[no-untyped-def]
+def energy_below(tables: Tables, rectangle: Rectangles, model: Model, limit: float) -> float:
     """Return the energy of a rectangle by itself if it is less than a limit, else some number that is not.
 
-    Most proposals are refused. What no roof could make good enough is given up without looking for its roof.
+    Most proposals are refused: where even the best roof would not reach the limit, no roof is fitted.
     """
     if model.weight == 0.0:
         return model.price
-    moments = scan(small, large, rectangle)
-    base = model.price - model.weight * (moments[0] - model.void_price * moments[1])
+    sums = scan(tables, rectangle)
+    base = model.price - model.weight * (sums.score - model.void_price * sums.outside)
     share = model.weight * model.fit_weight
     if share == 0.0:
-        return base
+        return float(base)
     needed = (base - limit) / share
-    if max(log_likelihood(moments[2], 0.0, model.least_tau), 0.0) <= needed:
+    if max(log_likelihood(sums.n, 0.0, model.least_tau), 0.0) <= needed:
         return np.inf
-    roof_price = model.roof_price / share
-    likelihood, _, _, _ = choose_roof(
-        small,
-        large,
-        rectangle,
-        moments,
-        roof_price,
-        model.least_tau,
-        ground_variance(rectangle, model),
-        model.least_height,
-        model.cell,
-        needed,
-    )
-    return base - share * likelihood
+    rules = RoofRules(model.roof_price / share, model.least_tau, model.least_height, model.cell)
+    likelihood, _, _, _ = choose_roof(tables, rectangle, sums, rules, ground_variance(rectangle, model), needed)
+    return float(base - share * likelihood)
 
 
 @kernel
-def least_energy(small, large, rectangle, model):  # type: ignore[no-untyped-def]
+def least_energy(tables: Tables, rectangle: Rectangles, model: Model) -> float:
     """Return a bound that the energy of a rectangle by itself is not less than, from its scan alone."""
     if model.weight == 0.0:
         return model.price
-    moments = scan(small, large, rectangle)
-    most = max(log_likelihood(moments[2], 0.0, model.least_tau), 0.0)
-    return model.price - model.weight * (moments[0] - model.void_price * moments[1] + model.fit_weight * most)
+    sums = scan(tables, rectangle)
+    most = max(log_likelihood(sums.n, 0.0, model.least_tau), 0.0)
+    base = model.price - model.weight * (sums.score - model.void_price * sums.outside + model.fit_weight * most)
+    return float(base)
 
 
 @kernel
-def overlaps(rectangles, count, rectangle, skip, other):  # type: ignore[no-untyped-def]
+def overlaps(rectangles: Rectangles, count: int, rectangle: Rectangles, skip: int, other: int) -> float:
     """Return the area, cells squared, that a rectangle shares with the first `count`, two of them passed over."""
     area = 0.0
     reach = 0.5 * math.hypot(rectangle[2], rectangle[3])
@@ -142,11 +146,11 @@ def overlaps(rectangles, count, rectangle, skip, other):  # type: ignore[no-unty
 
 
 @kernel
-def configuration_energy(small, large, rectangles, count, fixed, model):  # type: ignore[no-untyped-def]
+def configuration_energy(tables: Tables, rectangles: Rectangles, count: int, fixed: Rectangles, model: Model) -> float:
     """Return U of the first `count` rectangles, their overlap with fixed ones included, from scratch."""
     total = 0.0
     for i in range(count):
-        total += own_energy(small, large, rectangles[i], model)
+        total += rectangle_energy(tables, rectangles[i], model)
         total += model.overlap * overlaps(rectangles, i, rectangles[i], -1, -1)
         total += model.overlap * overlaps(fixed, len(fixed), rectangles[i], -1, -1)
     return total

@@ -31,7 +31,7 @@ from ...core.kernels import kernel
 from .cells import HIGH, LOW, VOID
 from .patches import patch_sizes
 from .rectangles import overlap_area, row_span
-from .workers import ALONE, Workers
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["lower_storeys"]
 
@@ -59,7 +59,7 @@ def lower_storeys(
     boxes: NDArray[np.float64],
     step: int,
     *,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> None:
     """Lower the storeys of all frames among the boxes, one box after the other, in place.
 
@@ -79,17 +79,17 @@ def lower_storeys(
         Largest first.
     step : int
         Centimetres.
-    workers : Workers
+    threads : Threads
     """
-    sizes = patch_sizes(labels, count, workers=workers)
-    wave = np.zeros(len(boxes), dtype=np.int64) if workers.count == 1 else _waves(boxes, *height.shape)
+    sizes = patch_sizes(labels, count, threads=threads)
+    wave = np.zeros(len(boxes), dtype=np.int64) if threads.count == 1 else _waves(boxes, *height.shape)
     for turn in range(wave.max(initial=-1) + 1):
         batch = boxes[wave == turn]
 
         def work(part: tuple[int, int], batch: NDArray[np.float64] = batch) -> None:
             _lower_boxes(height, state, roofs, labels, sizes, batch[slice(*part)], step)
 
-        workers.map(work, workers.ranges(batch[:, 2] * batch[:, 3], each=2))
+        threads.map(work, threads.ranges(batch[:, 2] * batch[:, 3], each=2))
 
 
 @kernel

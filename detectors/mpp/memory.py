@@ -1,7 +1,7 @@
-"""Memory that was let go of, handed back to the operating system.
+"""Freed memory, returned to the operating system.
 
-The C library of Linux keeps arrays below 32 MB, once freed, for later; the tables are too large to be laid there, so
-that for scenes of some million cells a third of the resident set would serve nobody.
+The C library of Linux keeps freed arrays below 32 MB for later use. The tables of large scenes do not fit into them, so
+for scenes of some million cells a third of the resident set would be unused memory.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 import ctypes
 import sys
 
-__all__ = ["give_back"]
+__all__ = ["release_memory"]
 
 
-def give_back() -> None:
-    """Hand freed memory back; does nothing where the C library is not GNU's."""
+def release_memory() -> None:
+    """Return freed memory to the system; does nothing where the C library is not GNU's."""
     if sys.platform == "linux":
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if trim is not None:

@@ -15,28 +15,64 @@ the frame has determinant 1.
 from __future__ import annotations
 
 import math
+from enum import IntEnum
+from typing import NamedTuple
 
 from ...core.kernels import kernel
+from .arrays import RandomState, Rectangles
 from .random_stream import gaussian, integer, uniform
+from .reshaping import move_edge
 
 __all__ = [
-    "MOVES",
+    "GAP",
+    "OFFSET",
+    "SKEW",
+    "Auxiliary",
+    "Move",
     "birth_log_ratio",
+    "draw_auxiliary",
     "merge_rectangles",
     "propose_change",
     "split_log_ratio",
     "split_rectangle",
 ]
 
-#: Names of the moves by number.
-MOVES = ("birth", "death", "shift", "edge", "side", "turn", "split", "merge")
+
+class Move(IntEnum):
+    """Kinds of moves."""
+
+    BIRTH = 0
+    DEATH = 1
+    SHIFT = 2
+    EDGE = 3
+    SIDE = 4
+    TURN = 5
+    SPLIT = 6
+    MERGE = 7
+
 
 #: Half widths of the auxiliary numbers: gap and offsets in cells, turn in radians.
 GAP, OFFSET, SKEW = 2.0, 4.0, 0.08
+#: Cells: the two scales of a walk. Small steps find the edge of a cell, large ones leave a wrong roof.
+_SMALL_STEP, _LARGE_STEP = 0.7, 4.0
+#: Radians that a turn has per cell of a walk.
+_TURN_STEP = 0.03
+
+
+class Auxiliary(NamedTuple):
+    """The five numbers that turn one rectangle into two; see the module."""
+
+    m: float
+    g: float
+    p: float
+    q: float
+    phi: float
 
 
 @kernel
-def birth_log_ratio(delta, temperature, density, count, q, log_birth, log_death):  # type: ignore[no-untyped-def]
+def birth_log_ratio(
+    delta: float, temperature: float, density: float, count: int, q: float, log_birth: float, log_death: float
+) -> float:
     """Return the log acceptance ratio of a birth into `count` buildings; that of the death back is its negative.
 
     Parameters
@@ -55,36 +91,37 @@ def birth_log_ratio(delta, temperature, density, count, q, log_birth, log_death)
 
 
 @kernel
-def propose_change(kind, old, new, state):  # type: ignore[no-untyped-def]
-    """Fill `new` by a symmetric walk from `old`: kind 2 shift, 3 edge, 4 side, 5 turn (see `MOVES`)."""
+def propose_change(kind: int, old: Rectangles, new: Rectangles, state: RandomState) -> None:
+    """Fill `new` by a symmetric walk from `old`; the kind is a shift, or a change of an edge, a side or the angle."""
     new[:] = old
-    # Two scales: fine steps find the edge of a cell, coarse ones leave a wrong roof.
-    scale = 0.7 if uniform(state) < 0.5 else 4.0
-    if kind == 2:
+    scale = _SMALL_STEP if uniform(state) < 0.5 else _LARGE_STEP
+    if kind == Move.SHIFT:
         new[0] += scale * gaussian(state)
         new[1] += scale * gaussian(state)
-    elif kind == 3:
+    elif kind == Move.EDGE:
         step = scale * gaussian(state)
-        side = integer(state, 4)
-        cos, sin = math.cos(old[4]), math.sin(old[4])
-        sign = 0.5 if side % 2 == 0 else -0.5
-        if side < 2:
-            new[2] += step
-            new[0] += sign * step * cos
-            new[1] += sign * step * sin
-        else:
-            new[3] += step
-            new[0] -= sign * step * sin
-            new[1] += sign * step * cos
-    elif kind == 4:
+        move_edge(old, integer(state, 4), step, new)
+    elif kind == Move.SIDE:
         new[2 + integer(state, 2)] += scale * gaussian(state)
     else:
-        new[4] = (new[4] + 0.03 * scale * gaussian(state)) % math.pi
+        new[4] = (new[4] + _TURN_STEP * scale * gaussian(state)) % math.pi
 
 
 @kernel
-def split_rectangle(parent, axis, m, g, p, q, phi, first, second):  # type: ignore[no-untyped-def]
+def draw_auxiliary(side: float, state: RandomState) -> Auxiliary:
+    """Draw the numbers of a split of a parent with this side along the split axis."""
+    m = side * (uniform(state) - 0.5)
+    g = GAP * (2.0 * uniform(state) - 1.0)
+    p = OFFSET * (2.0 * uniform(state) - 1.0)
+    q = OFFSET * (2.0 * uniform(state) - 1.0)
+    phi = SKEW * (2.0 * uniform(state) - 1.0)
+    return Auxiliary(m, g, p, q, phi)
+
+
+@kernel
+def split_rectangle(parent: Rectangles, axis: int, auxiliary: Auxiliary, first: Rectangles, second: Rectangles) -> None:
     """Fill the two parts of a parent split along `axis` (0: along u, 1: along v); m is measured from its centre."""
+    m, g, p, q, phi = auxiliary
     e, f = 0.5 * parent[2 + axis], 0.5 * parent[3 - axis]
     cos, sin = math.cos(parent[4]), math.sin(parent[4])
     for part in range(2):
@@ -103,11 +140,12 @@ def split_rectangle(parent, axis, m, g, p, q, phi, first, second):  # type: igno
 
 
 @kernel
-def merge_rectangles(first, second, axis, parent, auxiliary):  # type: ignore[no-untyped-def]
-    """Fill the parent whose split along `axis` gives the two, and m, g, p, q, phi; return whether there is one."""
+def merge_rectangles(first: Rectangles, second: Rectangles, axis: int, parent: Rectangles) -> tuple[bool, Auxiliary]:
+    """Fill the parent whose split along `axis` gives the two; return whether there is one, and the split's numbers."""
+    none = Auxiliary(0.0, 0.0, 0.0, 0.0, 0.0)
     turn = (first[4] - second[4] + 0.5 * math.pi) % math.pi - 0.5 * math.pi
     if abs(turn) > 2.0 * SKEW:
-        return False
+        return False, none
     theta = second[4] + 0.5 * turn
     cos, sin = math.cos(theta), math.sin(theta)
     dx, dy = second[0] - first[0], second[1] - first[1]
@@ -125,7 +163,7 @@ def merge_rectangles(first, second, axis, parent, auxiliary):  # type: ignore[no
     p = 0.5 * (-low - (across - high))
     q = 0.5 * (low - (across + high))
     if abs(g) > GAP or abs(p) > OFFSET or abs(q) > OFFSET:
-        return False
+        return False, none
     f1, f2 = -low - p, low - q
     centre_e, centre_f = 0.5 * (e1 + e2), 0.5 * (f1 + f2)
     du = centre_e if axis == 0 else centre_f
@@ -134,13 +172,14 @@ def merge_rectangles(first, second, axis, parent, auxiliary):  # type: ignore[no
     parent[1] = lower[1] + du * sin + dv * cos
     parent[2 + axis], parent[3 - axis] = e2 - e1, f2 - f1
     parent[4] = theta % math.pi
-    auxiliary[0], auxiliary[1] = 0.5 * (middle + begin) - centre_e, g
-    auxiliary[2], auxiliary[3], auxiliary[4] = p, q, phi
-    return parent[2] > 0.0 and parent[3] > 0.0
+    auxiliary = Auxiliary(0.5 * (middle + begin) - centre_e, g, p, q, phi)
+    return bool(parent[2] > 0.0 and parent[3] > 0.0), auxiliary
 
 
 @kernel
-def split_log_ratio(delta, temperature, density, count, side, near_first, near_second):  # type: ignore[no-untyped-def]
+def split_log_ratio(
+    delta: float, temperature: float, density: float, count: int, side: float, near_first: int, near_second: int
+) -> float:
     """Return the log acceptance ratio of a split, both moves tried equally often; of the merge back its negative.
 
     Parameters

@@ -13,29 +13,26 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import ParameterError
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..steps import Step
+from .arrays import Mask, Rectangles
 from .background import mean_evidence
 from .cells import has_points
 from .city import join_traces, sample_city, total_energy
-from .energy import own_energies
-from .memory import give_back
+from .energy import rectangle_energies
+from .memory import release_memory
 from .mpp_steps import mpp_steps
 from .outcome import as_blocks, as_buildings, fit_roofs
 from .parameters import MPPParameters
 from .preparation import Prepared, prepare
 from .tables import NO_TABLES
-from .workers import some_workers
+from .threads import started_threads
 
 __all__ = ["MPP"]
-
-_Rectangles = NDArray[np.float64]
-
 
 #: Parameters of earlier versions, and what to do instead.
 _REMOVED = {
@@ -80,7 +77,7 @@ class MPP(MPPParameters, Detector):
             return
         yield from mpp_steps(prepared, found.polygons, found.metadata["trace"])
 
-    def _evident(self, prepared: Prepared, rectangles: _Rectangles) -> NDArray[np.bool_]:
+    def _evident(self, prepared: Prepared, rectangles: Rectangles) -> Mask:
         """Return which rectangles look like a roof on the whole, not only in sum.
 
         Textures of neighbours resemble each other, so that the best of many windows in a crown sums up to a roof.
@@ -106,13 +103,13 @@ class MPP(MPPParameters, Detector):
         assert points is not None
         if not has_points(points.z):
             return Footprints.empty(crs=scene.crs, source=self.name), None
-        with some_workers(self.threads) as workers:
-            prepared = prepare(self, points, seen, workers)
+        with started_threads(self.threads) as threads:
+            prepared = prepare(self, points, seen, threads)
             ready = time.perf_counter()
-            rectangles, results = sample_city(self, prepared, seed, workers)
+            rectangles, results = sample_city(self, prepared, seed, threads)
         rectangles = rectangles[self._evident(prepared, rectangles)]
         done = time.perf_counter()
-        energies = own_energies(prepared.tables.small, prepared.tables.large, rectangles, prepared.model)
+        energies = rectangle_energies(prepared.tables, rectangles, prepared.model)
         fits = fit_roofs(prepared, rectangles)
         record: dict[str, Any] = {
             "seed": seed,
@@ -123,9 +120,9 @@ class MPP(MPPParameters, Detector):
             "trace": join_traces(results),
             "seconds": {"preparation": ready - began, "sampling": done - ready},
         }
-        # Outlines are made of cells alone, and take what the tables held.
+        # Outlines are made from the cells alone: the memory of the tables is released for them.
         prepared = replace(prepared, tables=NO_TABLES)
-        give_back()
+        release_memory()
         if self.outline == "blocks":
             found = as_blocks(prepared, rectangles, crs=scene.crs, record=record, source=self.name)
         else:

@@ -46,7 +46,7 @@ def mpp_steps(prepared: Prepared, buildings: NDArray[np.object_], trace: Mapping
         "What each cell adds to a rectangle: positive values support a roof, negative ones speak against it.",
         ValueRaster(prepared.score / MILLI, extent, evidence),
     )
-    boxes = shapely.polygons(to_world(prepared.boxes, prepared.grid))
+    boxes = shapely.polygons(to_world(prepared.boxes.rectangles, prepared.grid))
     yield _map(
         prepared,
         "boxes",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,43 +10,29 @@ import shapely
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
+from .arrays import Floats, Rectangles
 from .blocks import outline_blocks
 from .buildings import outline_buildings
 from .energy import ground_variance
 from .preparation import Prepared
 from .rectangles import to_world
-from .roofs import KINDS, fit_roof
+from .roofs import KINDS, RoofFit, fit_roof
 
 __all__ = ["as_blocks", "as_buildings", "fit_roofs"]
 
 
-def fit_roofs(prepared: Prepared, rectangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what `roofs.fit_roof` says of each rectangle, shape (n, 5)."""
-    tables, model = prepared.tables, prepared.model
-    share = model.weight * model.fit_weight
-    price = model.roof_price / share if share > 0 else math.inf
-    fits = np.zeros((len(rectangles), 5))
-    for rectangle, fit in zip(rectangles, fits, strict=True):
-        explained = ground_variance(rectangle, model)
-        fit_roof(
-            tables.small,
-            tables.large,
-            rectangle,
-            price,
-            model.least_tau,
-            explained,
-            model.least_height,
-            model.cell,
-            fit,
-        )
-    return fits
+def fit_roofs(prepared: Prepared, rectangles: Rectangles) -> list[RoofFit]:
+    """Return the roof of each rectangle."""
+    model = prepared.model
+    rules = model.roof_rules
+    return [fit_roof(prepared.tables, one, rules, ground_variance(one, model)) for one in rectangles]
 
 
 def as_buildings(
     prepared: Prepared,
-    rectangles: NDArray[np.float64],
-    fits: NDArray[np.float64],
-    energies: NDArray[np.float64],
+    rectangles: Rectangles,
+    fits: Sequence[RoofFit],
+    energies: Floats,
     *,
     follow_cells: bool,
     crs: str | None,
@@ -66,10 +52,10 @@ def as_buildings(
         outlines,
         crs=crs,
         attributes={
-            "height": fits[:, 1],
-            "tau": fits[:, 2],
-            "slope": fits[:, 4],
-            "roof": np.array([KINDS[int(kind)] for kind in fits[:, 3]], dtype=str),
+            "height": np.array([fit.height for fit in fits], dtype=np.float64),
+            "tau": np.array([fit.tau for fit in fits], dtype=np.float64),
+            "slope": np.array([fit.slope for fit in fits], dtype=np.float64),
+            "roof": np.array([KINDS[fit.kind] for fit in fits], dtype=str),
             "energy": energies,
         },
         metadata=record,
@@ -78,11 +64,11 @@ def as_buildings(
 
 
 def as_blocks(
-    prepared: Prepared, rectangles: NDArray[np.float64], *, crs: str | None, record: dict[str, Any], source: str
+    prepared: Prepared, rectangles: Rectangles, *, crs: str | None, record: dict[str, Any], source: str
 ) -> Footprints:
     """Return one footprint a block that the rectangles belong to, outlined along its cells (`blocks`)."""
     return Footprints.of(_blocks(prepared, rectangles), crs=crs, metadata=record, source=source)
 
 
-def _blocks(prepared: Prepared, rectangles: NDArray[np.float64]) -> NDArray[np.object_]:
+def _blocks(prepared: Prepared, rectangles: Rectangles) -> NDArray[np.object_]:
     return outline_blocks(rectangles, prepared.grid, prepared.state, prepared.score)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from .cells import VOID
-from .workers import ALONE, Workers
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["Rims", "cells_of_patches", "count_rims", "label_patches", "patch_sizes"]
 
@@ -33,7 +33,7 @@ _Labels = NDArray[np.int32]
 
 
 def label_patches(
-    height: NDArray[np.int32], mask: NDArray[np.bool_] | _Labels, step: int, *, workers: Workers = ALONE
+    height: NDArray[np.int32], mask: NDArray[np.bool_] | _Labels, step: int, *, threads: Threads = ONE_THREAD
 ) -> tuple[_Labels, int]:
     """Label the patches of the cells that a mask chooses; also return how many there are.
 
@@ -45,19 +45,19 @@ def label_patches(
         Not 0 where a cell belongs to a patch.
     step : int
         Centimetres by which neighbours in a patch differ at most.
-    workers : Workers
+    threads : Threads
     """
     labels = np.empty(height.shape, dtype=np.int32)
     # Laid out for the worst case, a patch for each cell; only what is written takes memory.
     parent = np.empty(height.size + 1, dtype=np.int32)
-    numbered = workers.bands(
+    numbered = threads.bands(
         lambda first, last: _label_rows(height, mask, step, first, last, labels, parent), len(height)
     )
     bands = np.array(numbered, dtype=np.int64)
     for row in bands[1:, 0]:
         _join_rows(height, labels, step, row, parent)
     count = _count_off(parent, bands, height.shape[1])
-    workers.bands(lambda first, last: _relabel(labels, parent, first, last), len(height))
+    threads.bands(lambda first, last: _relabel(labels, parent, first, last), len(height))
     return labels, count
 
 
@@ -132,25 +132,25 @@ def _relabel(labels, parent, first, last):  # type: ignore[no-untyped-def]
                 labels[r, c] = parent[labels[r, c]]
 
 
-def patch_sizes(labels: _Labels, count: int, *, workers: Workers = ALONE) -> NDArray[np.int64]:
+def patch_sizes(labels: _Labels, count: int, *, threads: Threads = ONE_THREAD) -> NDArray[np.int64]:
     """Return how many cells have each label, shape (count + 1,), 0 for label 0."""
-    tallies = workers.bands(lambda first, last: _tally(labels, count, first, last), len(labels))
+    tallies = threads.bands(lambda first, last: _tally(labels, count, first, last), len(labels))
     return np.asarray(np.sum(tallies, axis=0))
 
 
 def cells_of_patches(
-    labels: _Labels, count: int, *, workers: Workers = ALONE
+    labels: _Labels, count: int, *, threads: Threads = ONE_THREAD
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Return row and column of all cells of patches, patch by patch, and where each patch begins, shape (count + 1,).
 
     The cells of the patch with label k are those from ``starts[k - 1]`` to ``starts[k]``, in the order of the rows.
     """
-    tallies = workers.bands(lambda first, last: (first, last, _tally(labels, count, first, last)), len(labels))
+    tallies = threads.bands(lambda first, last: (first, last, _tally(labels, count, first, last)), len(labels))
     ends = np.cumsum(np.sum([tally for _, _, tally in tallies], axis=0))
     places = np.cumsum([np.concatenate([[0], ends[:-1]]), *(tally for _, _, tally in tallies)], axis=0)
     cells = np.empty((ends[-1], 2), dtype=np.int32)
     jobs = [(first, last, place) for (first, last, _), place in zip(tallies, places, strict=False)]
-    workers.map(lambda job: _sort_cells(labels, *job, cells), jobs)
+    threads.map(lambda job: _sort_cells(labels, *job, cells), jobs)
     return cells, ends
 
 
@@ -206,7 +206,7 @@ def count_rims(
     roof: _Labels,
     *,
     fall: int,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> Rims:
     """Go round all patches.
 
@@ -223,13 +223,13 @@ def count_rims(
         More than 0 where a neighbour is roof.
     fall : int
         Centimetres that roof must lie below the cell that touches it, at least, to count.
-    workers : Workers
+    threads : Threads
     """
 
     def work(first: int, last: int) -> NDArray[np.int64]:
         return _go_round(patches, count, height, state, roof, fall, first, last)  # type: ignore[no-any-return]
 
-    return Rims(*np.sum(workers.bands(work, len(patches)), axis=0))
+    return Rims(*np.sum(threads.bands(work, len(patches)), axis=0))
 
 
 @kernel

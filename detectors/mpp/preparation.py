@@ -16,15 +16,17 @@ from ...core.errors import ParameterError
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
+from .annealing import Boxes
+from .arrays import Heights, Mask, Rectangles, Scores, States
 from .background import Background, estimate_background, fitted_cells, score_cells, textures
 from .candidates import propose_boxes
 from .cells import Cells, cell_size, make_cells
-from .energy import Model, own_energies
-from .memory import give_back
+from .energy import Model, rectangle_energies
+from .memory import release_memory
 from .parameters import MPPParameters
 from .superstructures import lower_superstructures
 from .tables import LONGEST, TALLEST, Tables, make_tables
-from .workers import Workers
+from .threads import Threads
 
 __all__ = ["Prepared", "prepare"]
 
@@ -55,69 +57,69 @@ class Prepared:
     tables : Tables
         `tables.NO_TABLES` once they have served.
     model : Model
-    boxes : ndarray, shape (n, 5)
-        Best first.
-    weights, energies : ndarray, shape (n,)
-        Of the birth kernel of each box, and of the box by itself.
+    boxes : Boxes
     """
 
     grid: Grid
     height: NDArray[np.uint16]
-    state: NDArray[np.uint8]
-    score: NDArray[np.int16]
+    state: States
+    score: Scores
     background: Background
     tables: Tables
     model: Model
-    boxes: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    energies: NDArray[np.float64]
+    boxes: Boxes
 
 
-def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, workers: Workers) -> Prepared:
+def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads: Threads) -> Prepared:
     """Turn the cloud into cells, classes, tables and boxes."""
-    cell = parameters.cell or cell_size(points.x, points.y, scene.extent, workers=workers)
+    cell = parameters.cell or cell_size(points.x, points.y, scene.extent, threads=threads)
     if math.sqrt(2) * parameters.largest_side > LONGEST * cell:
         raise ParameterError(
             f"mpp: largest_side of {parameters.largest_side:g} m is too long for cells of {cell:g} m; a rectangle must "
             f"not reach over more than {LONGEST} cells: lower it to {math.floor(LONGEST * cell / math.sqrt(2))}, "
             f"or raise cell"
         )
-    background, height, state, score, fitted = _classes(parameters, points, scene, cell, workers)
+    background, height, state, score, fitted = _classes(parameters, points, scene, cell, threads)
     least = math.ceil(_SMALLEST_BOX / cell**2)
-    boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, workers=workers)
-    kept = _shortened(height, workers)
+    boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, threads=threads)
+    kept = _shortened(height, threads)
     del height
-    give_back()
-    tables = make_tables(kept, fitted, score, workers=workers)
-    model, sums = _model(parameters, cell), (tables.small, tables.large)
-    parts = workers.bands(lambda first, last: own_energies(*sums, boxes[first:last], model), len(boxes))
+    release_memory()
+    tables = make_tables(kept, fitted, score, threads=threads)
+    model, grid = _model(parameters, cell), Grid.covering(scene.extent, cell)
+    return Prepared(grid, kept, state, score, background, tables, model, _rated(boxes, tables, model, threads))
+
+
+def _rated(rectangles: Rectangles, tables: Tables, model: Model, threads: Threads) -> Boxes:
+    """Return boxes, those of the lowest energy first, with the weights of their birth kernels."""
+    parts = threads.bands(
+        lambda first, last: rectangle_energies(tables, rectangles[first:last], model), len(rectangles)
+    )
     energies = np.concatenate([np.empty(0), *parts])
     order = np.argsort(energies, kind="stable")
-    boxes, energies = boxes[order], energies[order]
-    weights = np.sqrt(np.maximum(-energies, 1.0))
-    grid = Grid.covering(scene.extent, cell)
-    return Prepared(grid, kept, state, score, background, tables, model, boxes, weights, energies)
+    rectangles, energies = rectangles[order], energies[order]
+    return Boxes(rectangles, np.sqrt(np.maximum(-energies, 1.0)), energies)
 
 
-def _shortened(height: NDArray[np.int32], workers: Workers) -> NDArray[np.uint16]:
+def _shortened(height: Heights, threads: Threads) -> NDArray[np.uint16]:
     """Return heights that are only read from here on: two bytes hold them."""
     short = np.empty(height.shape, dtype=np.uint16)
 
     def work(first: int, last: int) -> None:
         np.minimum(height[first:last], TALLEST, out=short[first:last], casting="unsafe")
 
-    workers.bands(work, len(height))
+    threads.bands(work, len(height))
     return short
 
 
 def _classes(
-    parameters: MPPParameters, points: PointCloud, scene: Scene, cell: float, workers: Workers
-) -> tuple[Background, NDArray[np.int32], NDArray[np.uint8], NDArray[np.int16], NDArray[np.bool_]]:
+    parameters: MPPParameters, points: PointCloud, scene: Scene, cell: float, threads: Threads
+) -> tuple[Background, Heights, States, Scores, Mask]:
     """Return the classes of the scene, and height, state, score and whether it is fitted of each cell."""
     low = _LOW_SHARE * parameters.least_height
-    cells = make_cells(points, scene.heights.ground, Grid.covering(scene.extent, cell), low=low, workers=workers)
-    background, bins = estimate_background(cells, workers=workers)
-    fitted = _fitted(parameters, cells, bins, background, workers)
+    cells = make_cells(points, scene.heights.ground, Grid.covering(scene.extent, cell), low=low, threads=threads)
+    background, bins = estimate_background(cells, threads=threads)
+    fitted = _fitted(parameters, cells, bins, background, threads)
     if parameters.carried_share <= 1:
         height, state = lower_superstructures(
             cells.height,
@@ -126,11 +128,11 @@ def _classes(
             step=parameters.roof_step,
             share=parameters.carried_share,
             most=int(_LARGEST_STRUCTURE / cell**2),
-            workers=workers,
+            threads=threads,
         )
         cells = replace(cells, height=height, state=state)
-        bins = textures(cells.height, cells.state, cells.openness, workers=workers)
-        fitted = _fitted(parameters, cells, bins, background, workers)
+        bins = textures(cells.height, cells.state, cells.openness, threads=threads)
+        fitted = _fitted(parameters, cells, bins, background, threads)
     score = score_cells(
         cells,
         bins,
@@ -140,16 +142,16 @@ def _classes(
         texture_limit=parameters.texture_limit,
         low_price=parameters.low_price,
         void_price=parameters.void_price,
-        workers=workers,
+        threads=threads,
     )
     return background, cells.height, cells.state, score, fitted
 
 
 def _fitted(
-    parameters: MPPParameters, cells: Cells, bins: NDArray[np.int16], background: Background, workers: Workers
-) -> NDArray[np.bool_]:
+    parameters: MPPParameters, cells: Cells, bins: NDArray[np.int16], background: Background, threads: Threads
+) -> Mask:
     weight, limit = parameters.texture_weight, parameters.texture_limit
-    return fitted_cells(cells, bins, background, texture_weight=weight, texture_limit=limit, workers=workers)
+    return fitted_cells(cells, bins, background, texture_weight=weight, texture_limit=limit, threads=threads)
 
 
 def _model(parameters: MPPParameters, cell: float) -> Model:

@@ -11,26 +11,27 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from .arrays import RandomState
 
 __all__ = ["gaussian", "integer", "stream", "uniform"]
 
 
-def stream(entropy: Sequence[int]) -> NDArray[np.uint64]:
+def stream(entropy: Sequence[int]) -> RandomState:
     """Return the state, shape (4,), of the stream that belongs to whole numbers such as (seed, column, row)."""
     words = np.random.SeedSequence([int(number) for number in entropy]).generate_state(4, np.uint64)
     return words.astype(np.uint64)
 
 
 @kernel(inline="always")
-def _left(word, bits):  # type: ignore[no-untyped-def]
+def _left(word: np.uint64, bits: int) -> np.uint64:
+    """Rotate a word to the left."""
     return (word << np.uint64(bits)) | (word >> np.uint64(64 - bits))
 
 
 @kernel
-def uniform(state):  # type: ignore[no-untyped-def]
+def uniform(state: RandomState) -> float:
     """Draw from [0, 1) with 53 random bits and advance the state."""
     result = _left(state[0] + state[3], 23) + state[0]
     shifted = state[1] << np.uint64(17)
@@ -44,13 +45,13 @@ def uniform(state):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def integer(state, size):  # type: ignore[no-untyped-def]
+def integer(state: RandomState, size: int) -> int:
     """Draw from 0 .. size - 1."""
     return min(int(uniform(state) * size), size - 1)
 
 
 @kernel
-def gaussian(state):  # type: ignore[no-untyped-def]
+def gaussian(state: RandomState) -> float:
     """Draw from the standard normal distribution (Box and Muller; the second value is not kept)."""
     radius = math.sqrt(-2.0 * math.log(1.0 - uniform(state)))
     return radius * math.cos(2.0 * math.pi * uniform(state))

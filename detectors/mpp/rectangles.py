@@ -15,15 +15,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from ...scenes.geodata.raster import Grid
+from .arrays import Floats, Mask, Rectangles
 
 __all__ = ["corners", "inside_any", "overlap_area", "row_span", "to_grid_frame", "to_world"]
 
 
-def corners(rectangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def corners(rectangles: Rectangles) -> Floats:
     """Return the corners in the grid frame, shape (n, 4, 2), of rectangles, shape (n, 5)."""
     r = np.asarray(rectangles, dtype=np.float64).reshape(-1, 5)
     along = np.stack([np.cos(r[:, 4]), np.sin(r[:, 4])], axis=-1) * r[:, 2:3] / 2
@@ -32,14 +32,14 @@ def corners(rectangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([r[:, :2] + i * along + j * across for i, j in signs], axis=1)
 
 
-def to_world(rectangles: NDArray[np.float64], grid: Grid) -> NDArray[np.float64]:
+def to_world(rectangles: Rectangles, grid: Grid) -> Floats:
     """Return the corners in metres of the CRS, shape (n, 4, 2)."""
     place = corners(rectangles)
     x, y = grid.to_world(place[..., 1], place[..., 0])
     return np.stack([x, y], axis=-1)
 
 
-def to_grid_frame(quadrilaterals: NDArray[np.float64], grid: Grid) -> NDArray[np.float64]:
+def to_grid_frame(quadrilaterals: Floats, grid: Grid) -> Rectangles:
     """Return rectangles, shape (n, 5), from corners in metres of the CRS, shape (n, 4, 2) in ring order."""
     row, column = grid.to_pixel(quadrilaterals[..., 0], quadrilaterals[..., 1])
     place = np.stack([column, row], axis=-1)
@@ -50,7 +50,7 @@ def to_grid_frame(quadrilaterals: NDArray[np.float64], grid: Grid) -> NDArray[np
 
 
 @kernel(inline="always")
-def row_span(dy, half_a, half_b, cos, sin):  # type: ignore[no-untyped-def]
+def row_span(dy: float, half_a: float, half_b: float, cos: float, sin: float) -> tuple[float, float]:
     """Return the interval of x - centre x, inside the rectangle, of the line at y - centre y = dy; lo > hi when none.
 
     Inside is |dx cos + dy sin| <= a/2 and |-dx sin + dy cos| <= b/2: the intersection of two intervals.
@@ -70,7 +70,7 @@ def row_span(dy, half_a, half_b, cos, sin):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def overlap_area(first, second):  # type: ignore[no-untyped-def]
+def overlap_area(first: Rectangles, second: Rectangles) -> float:
     """Return the common area of two rectangles in cells squared.
 
     The corners of the first, in the frame of the second, are clipped at its four sides (Sutherland and Hodgman 1974).
@@ -118,10 +118,10 @@ def overlap_area(first, second):  # type: ignore[no-untyped-def]
     for i in range(n):
         j = (i + 1) % n
         area += p[now, i, 0] * p[now, j, 1] - p[now, j, 0] * p[now, i, 1]
-    return 0.5 * abs(area)
+    return float(0.5 * abs(area))
 
 
-def inside_any(rectangles: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.bool_]:
+def inside_any(rectangles: Rectangles, shape: tuple[int, int]) -> Mask:
     """Return which cells of a grid of this shape have their centre inside one of the rectangles, shape (n, 5)."""
     mask = np.zeros(shape, dtype=np.bool_)
     _fill(np.ascontiguousarray(rectangles, dtype=np.float64), mask)
@@ -129,7 +129,8 @@ def inside_any(rectangles: NDArray[np.float64], shape: tuple[int, int]) -> NDArr
 
 
 @kernel
-def _fill(rectangles, mask):  # type: ignore[no-untyped-def]
+def _fill(rectangles: Rectangles, mask: Mask) -> None:
+    """Mark the cells whose centre lies in one of the rectangles, in place."""
     rows, columns = mask.shape
     for k in range(len(rectangles)):
         cx, cy, half_a, half_b = rectangles[k, 0], rectangles[k, 1], 0.5 * rectangles[k, 2], 0.5 * rectangles[k, 3]

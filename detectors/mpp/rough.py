@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from .cells import HIGH
-from .workers import ALONE, Workers
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["smooth_walls"]
 
@@ -23,7 +23,7 @@ _WAITING = np.int32(-1)
 
 
 def smooth_walls(
-    height: NDArray[np.int32], state: NDArray[np.uint8], labels: NDArray[np.int32], *, workers: Workers = ALONE
+    height: NDArray[np.int32], state: NDArray[np.uint8], labels: NDArray[np.int32], *, threads: Threads = ONE_THREAD
 ) -> None:
     """Give rough cells between labelled ones the label and height of the neighbour nearest in height, in place.
 
@@ -34,9 +34,9 @@ def smooth_walls(
     state : ndarray of uint8, shape (rows, columns)
     labels : ndarray of int32, shape (rows, columns)
         Patches from 1.
-    workers : Workers
+    threads : Threads
     """
-    taken = workers.bands(lambda first, last: _first_round(height, state, labels, first, last), len(labels))
+    taken = threads.bands(lambda first, last: _first_round(height, state, labels, first, last), len(labels))
     if taken:
         _further_rounds(height, state, labels, np.concatenate(taken))
 

@@ -2,60 +2,131 @@
 
 Nouns
 -----
-window
-    Rectangle of the grid in which centres may lie; buildings centred outside are *fixed*: they are seen, not changed.
 temperature
     Falls geometrically from the first to the last proposal; at temperature 1 with a constant schedule the chain samples
-    exp(-U) relative to the Poisson process, which is what the tests hold it to.
+    exp(-U) relative to the Poisson process, which is what the tests verify.
 trace
-    One row per stride of proposals: proposals made, temperature, energy, number of buildings, then per move how often
-    it was tried and accepted.
+    One row per stride of proposals; its columns are those of `Trace`.
 """
 
 from __future__ import annotations
 
 import math
+from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core.kernels import kernel
-from .births import birth_density, propose_birth
-from .energy import configuration_energy, energy_below, least_energy, overlaps, own_energy
+from .arrays import Floats, RandomState, Rectangles
+from .births import Births, birth_density, propose_birth
+from .energy import energy_below, least_energy, overlaps, rectangle_energy
 from .moves import (
-    GAP,
-    OFFSET,
-    SKEW,
+    Move,
     birth_log_ratio,
+    draw_auxiliary,
     merge_rectangles,
     propose_change,
     split_log_ratio,
     split_rectangle,
 )
 from .random_stream import integer, uniform
+from .windows import Window, allowed, shared_area, window_energy
 
-__all__ = ["TRACE_COLUMNS", "run_chain"]
+__all__ = ["ChainSchedule", "Trace", "run_chain"]
 
-#: Columns of a trace: 4 numbers, then tried and accepted of 8 moves.
-TRACE_COLUMNS = 20
+#: Shares of shifts, edges, sides and turns among themselves, summed up; the rest are turns.
+_SHIFTS, _EDGES, _SIDES = 0.25, 0.70, 0.80
+#: The best state is kept as soon as the temperature is below this many times the last one.
+_COLD_ENOUGH = 2.0
+#: Gain of energy that makes a state a better one.
+_BETTER = 1e-9
 
-_BIRTH, _DEATH, _SHIFT, _EDGE, _SIDE, _TURN, _SPLIT, _MERGE = 0, 1, 2, 3, 4, 5, 6, 7
+
+class Trace(IntEnum):
+    """Columns of a trace; from `TRIED` and from `ACCEPTED` on one column for each `Move`."""
+
+    PROPOSALS = 0
+    TEMPERATURE = 1
+    ENERGY = 2
+    BUILDINGS = 3
+    TRIED = 4
+    ACCEPTED = 12
+    COLUMNS = 20
+
+
+class ChainSchedule(NamedTuple):
+    """How a chain is run.
+
+    Attributes
+    ----------
+    proposals : int
+    hot, cold : float
+        First and last temperature.
+    intensity : float
+        Expected number of buildings per square cell under the prior.
+    jump_share, split_share : float
+        Share of births and deaths, and of splits and merges, each in equal parts, among the moves.
+    merge_reach : float
+        Distance of centres, cells, within which two buildings may merge.
+    stride : int
+        Proposals per row of the trace.
+    """
+
+    proposals: int
+    hot: float
+    cold: float
+    intensity: float
+    jump_share: float
+    split_share: float
+    merge_reach: float
+    stride: int
+
+
+class _Chain(NamedTuple):
+    """The state of a chain and its scratch space.
+
+    Attributes
+    ----------
+    rectangles : ndarray, shape (capacity, 5)
+    energies : ndarray, shape (capacity,)
+        Of each rectangle by itself.
+    new, other : ndarray, shape (5,)
+        What is proposed.
+    state : ndarray of uint64
+        Random stream.
+    """
+
+    rectangles: Rectangles
+    energies: Floats
+    new: Rectangles
+    other: Rectangles
+    state: RandomState
+
+
+class _Odds(NamedTuple):
+    """What a proposal is accepted by.
+
+    Attributes
+    ----------
+    temperature : float
+    density : float
+        Of the prior, per unit of (x, y, a, b, angle).
+    log_jump : float
+        Logarithm of the probability of trying a birth, which is that of trying a death.
+    limit : float
+        The proposal is accepted when the energy rises by less, for a log acceptance ratio of -delta / temperature.
+    """
+
+    temperature: float
+    density: float
+    log_jump: float
+    limit: float
 
 
 @kernel
-def _inside(rectangle, births):  # type: ignore[no-untyped-def]
-    """Whether the target is positive: centre in the window, sides in their range."""
-    w, s = births.window, births.sides
-    return (
-        w[0] <= rectangle[0] < w[2]
-        and w[1] <= rectangle[1] < w[3]
-        and s[0] <= rectangle[2] <= s[1]
-        and s[0] <= rectangle[3] <= s[1]
-    )
-
-
-@kernel
-def _neighbours(rectangles, count, i, reach):  # type: ignore[no-untyped-def]
-    """How many others lie with their centre within reach of building i."""
+def _neighbours(rectangles: Rectangles, count: int, i: int, reach: float) -> int:
+    """Return how many others lie with their centre within reach of building i."""
     near = 0
     for j in range(count):
         dx, dy = rectangles[j, 0] - rectangles[i, 0], rectangles[j, 1] - rectangles[i, 1]
@@ -65,8 +136,8 @@ def _neighbours(rectangles, count, i, reach):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _pick_neighbour(rectangles, count, i, reach, number):  # type: ignore[no-untyped-def]
-    """Index of the neighbour of building i with this number, in order of index."""
+def _pick_neighbour(rectangles: Rectangles, count: int, i: int, reach: float, number: int) -> int:
+    """Return the index of the neighbour of building i with this number, in order of index."""
     for j in range(count):
         dx, dy = rectangles[j, 0] - rectangles[i, 0], rectangles[j, 1] - rectangles[i, 1]
         if j != i and dx * dx + dy * dy < reach * reach:
@@ -77,194 +148,205 @@ def _pick_neighbour(rectangles, count, i, reach, number):  # type: ignore[no-unt
 
 
 @kernel
-def _common(rectangles, count, fixed, rectangle, skip, other):  # type: ignore[no-untyped-def]
-    return overlaps(rectangles, count, rectangle, skip, other) + overlaps(fixed, len(fixed), rectangle, -1, -1)
+def _try_birth(window: Window, births: Births, chain: _Chain, count: int, odds: _Odds) -> tuple[int, float]:
+    """Propose a birth; return the number of buildings afterwards and by how much the energy changed."""
+    new = chain.new
+    propose_birth(births, chain.state, new)
+    if not allowed(window, new) or count >= len(chain.energies):
+        return count, 0.0
+    q = birth_density(births, new)
+    ratio = birth_log_ratio(0.0, odds.temperature, odds.density, count, q, odds.log_jump, odds.log_jump)
+    limit = odds.limit + odds.temperature * ratio
+    shared = window.model.overlap * shared_area(window, chain.rectangles, count, new, -1, -1)
+    alone = energy_below(window.tables, new, window.model, limit - shared)
+    if alone + shared >= limit:
+        return count, 0.0
+    chain.rectangles[count] = new
+    chain.energies[count] = alone
+    return count + 1, alone + shared
 
 
 @kernel
-def run_chain(  # type: ignore[no-untyped-def]
-    small,
-    large,
-    model,
-    births,
-    start,
-    fixed,
-    state,
-    proposals,
-    hot,
-    cold,
-    intensity,
-    jump_share,
-    split_share,
-    reach,
-    capacity,
-    stride,
-):
+def _try_death(window: Window, births: Births, chain: _Chain, count: int, odds: _Odds) -> tuple[int, float]:
+    """Propose a death; returns what `_try_birth` does."""
+    if count == 0:
+        return count, 0.0
+    rectangles, energies = chain.rectangles, chain.energies
+    i = integer(chain.state, count)
+    q = birth_density(births, rectangles[i])
+    ratio = birth_log_ratio(0.0, odds.temperature, odds.density, count - 1, q, odds.log_jump, odds.log_jump)
+    limit = odds.limit - odds.temperature * ratio
+    delta = -energies[i] - window.model.overlap * shared_area(window, rectangles, count, rectangles[i], i, -1)
+    if delta >= limit:
+        return count, 0.0
+    rectangles[i] = rectangles[count - 1]
+    energies[i] = energies[count - 1]
+    return count - 1, delta
+
+
+@kernel
+def _try_split(window: Window, chain: _Chain, count: int, odds: _Odds, axis: int, reach: float) -> tuple[int, float]:
+    """Propose a split along an axis; returns what `_try_birth` does."""
+    if not 0 < count < len(chain.energies):
+        return count, 0.0
+    model, tables, rectangles, energies = window.model, window.tables, chain.rectangles, chain.energies
+    new, other = chain.new, chain.other
+    i = integer(chain.state, count)
+    side = rectangles[i, 2 + axis]
+    split_rectangle(rectangles[i], axis, draw_auxiliary(side, chain.state), new, other)
+    apart = math.hypot(new[0] - other[0], new[1] - other[1])
+    if not (allowed(window, new) and allowed(window, other) and apart < reach):
+        return count, 0.0
+    parent = rectangles[i].copy()
+    rectangles[i], rectangles[count] = new, other
+    near_first = _neighbours(rectangles, count + 1, i, reach)
+    near_second = _neighbours(rectangles, count + 1, count, reach)
+    rectangles[i] = parent
+    ratio = split_log_ratio(0.0, odds.temperature, odds.density, count, side, near_first, near_second)
+    limit = odds.limit + odds.temperature * ratio
+    pair = np.empty((1, 5))
+    pair[0] = new
+    shared = overlaps(pair, 1, other, -1, -1)
+    shared += shared_area(window, rectangles, count, new, i, -1)
+    shared += shared_area(window, rectangles, count, other, i, -1)
+    shared -= shared_area(window, rectangles, count, parent, i, -1)
+    rest = model.overlap * shared - energies[i]
+    least = least_energy(tables, other, model)
+    first = energy_below(tables, new, model, limit - rest - least)
+    second = energy_below(tables, other, model, limit - rest - first)
+    if first + second + rest >= limit:
+        return count, 0.0
+    rectangles[i], energies[i] = new, first
+    rectangles[count], energies[count] = other, second
+    return count + 1, first + second + rest
+
+
+@kernel
+def _try_merge(window: Window, chain: _Chain, count: int, odds: _Odds, axis: int, reach: float) -> tuple[int, float]:
+    """Propose a merge along an axis; returns what `_try_birth` does."""
+    if count < 2:
+        return count, 0.0
+    model, rectangles, energies, new = window.model, chain.rectangles, chain.energies, chain.new
+    i = integer(chain.state, count)
+    near_first = _neighbours(rectangles, count, i, reach)
+    if near_first == 0:
+        return count, 0.0
+    j = _pick_neighbour(rectangles, count, i, reach, integer(chain.state, near_first))
+    found, _ = merge_rectangles(rectangles[i], rectangles[j], axis, new)
+    if not (found and allowed(window, new)):
+        return count, 0.0
+    near_second = _neighbours(rectangles, count, j, reach)
+    ratio = split_log_ratio(0.0, odds.temperature, odds.density, count - 1, new[2 + axis], near_first, near_second)
+    limit = odds.limit - odds.temperature * ratio
+    shared = shared_area(window, rectangles, count, new, i, j)
+    shared -= shared_area(window, rectangles, count, rectangles[i], i, -1)
+    shared -= shared_area(window, rectangles, count, rectangles[j], i, j)
+    rest = model.overlap * shared - energies[i] - energies[j]
+    alone = energy_below(window.tables, new, model, limit - rest)
+    if alone + rest >= limit:
+        return count, 0.0
+    rectangles[i], energies[i] = new, alone
+    rectangles[j], energies[j] = rectangles[count - 1], energies[count - 1]
+    return count - 1, alone + rest
+
+
+@kernel
+def _try_change(window: Window, chain: _Chain, count: int, odds: _Odds, kind: int) -> tuple[bool, float]:
+    """Propose a shift or a change of an edge, side or angle; return whether it was accepted and the energy's change."""
+    if count == 0:
+        return False, 0.0
+    model, rectangles, energies, new = window.model, chain.rectangles, chain.energies, chain.new
+    i = integer(chain.state, count)
+    propose_change(kind, rectangles[i], new, chain.state)
+    if not allowed(window, new):
+        return False, 0.0
+    rest = -energies[i] - model.overlap * shared_area(window, rectangles, count, rectangles[i], i, -1)
+    alone = energy_below(window.tables, new, model, odds.limit - rest)
+    # Overlap is never negative: what the data refuse is not compared with the neighbours.
+    if alone + rest >= odds.limit:
+        return False, 0.0
+    rest += model.overlap * shared_area(window, rectangles, count, new, i, -1)
+    if alone + rest >= odds.limit:
+        return False, 0.0
+    rectangles[i], energies[i] = new, alone
+    return True, alone + rest
+
+
+@kernel
+def _drawn_move(draw: float, schedule: ChainSchedule) -> Move:
+    """Return the move that a uniform number stands for."""
+    if draw < schedule.jump_share:
+        return Move.BIRTH if draw < 0.5 * schedule.jump_share else Move.DEATH
+    if draw < schedule.jump_share + schedule.split_share:
+        return Move.SPLIT if draw < schedule.jump_share + 0.5 * schedule.split_share else Move.MERGE
+    draw = (draw - schedule.jump_share - schedule.split_share) / (1.0 - schedule.jump_share - schedule.split_share)
+    if draw < _SHIFTS:
+        return Move.SHIFT
+    if draw < _EDGES:
+        return Move.EDGE
+    return Move.SIDE if draw < _SIDES else Move.TURN
+
+
+@kernel
+def run_chain(
+    window: Window, births: Births, start: Rectangles, schedule: ChainSchedule, capacity: int, state: RandomState
+) -> tuple[Rectangles, Rectangles, Floats, float]:
     """Run the chain and return the best state, the last state, the trace and the best energy.
 
     Parameters
     ----------
-    small, large : tables
-    model : Model
+    window : Window
     births : Births
     start : ndarray, shape (n, 5)
         First state; its centres lie in the window.
-    fixed : ndarray, shape (m, 5)
-    state : ndarray of uint64, shape (4,)
-        Random stream; advanced.
-    proposals : int
-    hot, cold : float
-        First and last temperature.
-    intensity : float
-        Expected number of buildings per square cell under the prior.
-    jump_share, split_share : float
-        Share of births and deaths, and of splits and merges, each in equal parts, among the moves.
-    reach : float
-        Distance of centres, cells, within which two buildings may merge.
+    schedule : ChainSchedule
     capacity : int
         More buildings than this are not held; births beyond it are refused.
-    stride : int
-        Proposals per row of the trace.
+    state : ndarray of uint64, shape (4,)
+        Random stream; advanced.
     """
-    span = births.sides[1] - births.sides[0]
-    density = intensity / (span * span * math.pi)
-    rectangles = np.empty((capacity, 5))
-    own = np.empty(capacity)
+    model = window.model
+    span = model.largest_side - model.least_side
+    density = schedule.intensity / (span * span * math.pi)
+    chain = _Chain(np.empty((capacity, 5)), np.empty(capacity), np.empty(5), np.empty(5), state)
     count = min(len(start), capacity)
     for i in range(count):
-        rectangles[i] = start[i]
-        own[i] = own_energy(small, large, start[i], model)
-    energy = configuration_energy(small, large, rectangles, count, fixed, model)
-    best, best_energy = rectangles[:count].copy(), energy
-    rows = (proposals + stride - 1) // stride
-    trace = np.zeros((rows, TRACE_COLUMNS))
-    new, other, parent, auxiliary, pair = np.empty(5), np.empty(5), np.empty(5), np.empty(5), np.empty((1, 5))
-    log_jump = math.log(0.5 * jump_share) if jump_share > 0.0 else 0.0
-    cooling = math.log(cold / hot) / max(proposals - 1, 1)
-    for t in range(proposals):
-        temperature = hot * math.exp(cooling * t)
-        row = t // stride
-        draw = uniform(state)
+        chain.rectangles[i] = start[i]
+        chain.energies[i] = rectangle_energy(window.tables, start[i], model)
+    energy = window_energy(window, chain.rectangles[:count])
+    best, best_energy = chain.rectangles[:count].copy(), energy
+    rows = (schedule.proposals + schedule.stride - 1) // schedule.stride
+    trace = np.zeros((rows, Trace.COLUMNS))
+    log_jump = math.log(0.5 * schedule.jump_share) if schedule.jump_share > 0.0 else 0.0
+    cooling = math.log(schedule.cold / schedule.hot) / max(schedule.proposals - 1, 1)
+    for t in range(schedule.proposals):
+        temperature = schedule.hot * math.exp(cooling * t)
+        row = t // schedule.stride
+        kind = _drawn_move(uniform(state), schedule)
         # A move is accepted when its log ratio C - delta / T exceeds the logarithm of a uniform number, that is, when
-        # delta < limit + T C. The number is drawn first, so that energies above it need not be known.
-        limit = -temperature * math.log(1.0 - uniform(state))
+        # delta < limit + T C. The number is drawn first, so that energies above it need not be known exactly.
+        odds = _Odds(temperature, density, log_jump, -temperature * math.log(1.0 - uniform(state)))
+        before = count
         accepted = False
-        if draw < jump_share:
-            if draw < 0.5 * jump_share:
-                kind = _BIRTH
-                propose_birth(births, state, new)
-                if _inside(new, births) and count < capacity:
-                    q = birth_density(births, new)
-                    limit += temperature * birth_log_ratio(0.0, temperature, density, count, q, log_jump, log_jump)
-                    shared = model.overlap * _common(rectangles, count, fixed, new, -1, -1)
-                    alone = energy_below(small, large, new, model, limit - shared)
-                    if alone + shared < limit:
-                        rectangles[count] = new
-                        own[count] = alone
-                        count += 1
-                        energy += alone + shared
-                        accepted = True
-            else:
-                kind = _DEATH
-                if count > 0:
-                    i = integer(state, count)
-                    q = birth_density(births, rectangles[i])
-                    limit -= temperature * birth_log_ratio(0.0, temperature, density, count - 1, q, log_jump, log_jump)
-                    delta = -own[i] - model.overlap * _common(rectangles, count, fixed, rectangles[i], i, -1)
-                    if delta < limit:
-                        count -= 1
-                        rectangles[i] = rectangles[count]
-                        own[i] = own[count]
-                        energy += delta
-                        accepted = True
-        elif draw < jump_share + split_share:
-            axis = integer(state, 2)
-            if draw < jump_share + 0.5 * split_share:
-                kind = _SPLIT
-                if 0 < count < capacity:
-                    i = integer(state, count)
-                    side = rectangles[i, 2 + axis]
-                    m = side * (uniform(state) - 0.5)
-                    g, p = GAP * (2.0 * uniform(state) - 1.0), OFFSET * (2.0 * uniform(state) - 1.0)
-                    q, phi = OFFSET * (2.0 * uniform(state) - 1.0), SKEW * (2.0 * uniform(state) - 1.0)
-                    split_rectangle(rectangles[i], axis, m, g, p, q, phi, new, other)
-                    apart = math.hypot(new[0] - other[0], new[1] - other[1])
-                    if _inside(new, births) and _inside(other, births) and apart < reach:
-                        parent[:] = rectangles[i]
-                        rectangles[i], rectangles[count] = new, other
-                        near_first = _neighbours(rectangles, count + 1, i, reach)
-                        near_second = _neighbours(rectangles, count + 1, count, reach)
-                        rectangles[i] = parent
-                        ratio = split_log_ratio(0.0, temperature, density, count, side, near_first, near_second)
-                        limit += temperature * ratio
-                        pair[0] = new
-                        shared = overlaps(pair, 1, other, -1, -1)
-                        shared += _common(rectangles, count, fixed, new, i, -1)
-                        shared += _common(rectangles, count, fixed, other, i, -1)
-                        shared -= _common(rectangles, count, fixed, parent, i, -1)
-                        rest = model.overlap * shared - own[i]
-                        least = least_energy(small, large, other, model)
-                        first = energy_below(small, large, new, model, limit - rest - least)
-                        second = energy_below(small, large, other, model, limit - rest - first)
-                        if first + second + rest < limit:
-                            rectangles[i], own[i] = new, first
-                            rectangles[count], own[count] = other, second
-                            count += 1
-                            energy += first + second + rest
-                            accepted = True
-            else:
-                kind = _MERGE
-                if count > 1:
-                    i = integer(state, count)
-                    near_first = _neighbours(rectangles, count, i, reach)
-                    if near_first > 0:
-                        j = _pick_neighbour(rectangles, count, i, reach, integer(state, near_first))
-                        found = merge_rectangles(rectangles[i], rectangles[j], axis, new, auxiliary)
-                        if found and _inside(new, births):
-                            near_second = _neighbours(rectangles, count, j, reach)
-                            side = new[2 + axis]
-                            ratio = split_log_ratio(0.0, temperature, density, count - 1, side, near_first, near_second)
-                            limit -= temperature * ratio
-                            shared = _common(rectangles, count, fixed, new, i, j)
-                            shared -= _common(rectangles, count, fixed, rectangles[i], i, -1)
-                            shared -= _common(rectangles, count, fixed, rectangles[j], i, j)
-                            rest = model.overlap * shared - own[i] - own[j]
-                            alone = energy_below(small, large, new, model, limit - rest)
-                            if alone + rest < limit:
-                                rectangles[i], own[i] = new, alone
-                                count -= 1
-                                rectangles[j], own[j] = rectangles[count], own[count]
-                                energy += alone + rest
-                                accepted = True
+        if kind == Move.BIRTH:
+            count, delta = _try_birth(window, births, chain, count, odds)
+        elif kind == Move.DEATH:
+            count, delta = _try_death(window, births, chain, count, odds)
+        elif kind == Move.SPLIT:
+            count, delta = _try_split(window, chain, count, odds, integer(state, 2), schedule.merge_reach)
+        elif kind == Move.MERGE:
+            count, delta = _try_merge(window, chain, count, odds, integer(state, 2), schedule.merge_reach)
         else:
-            kind = _SHIFT
-            draw = (draw - jump_share - split_share) / (1.0 - jump_share - split_share)
-            if draw >= 0.25:
-                kind = _EDGE
-            if draw >= 0.70:
-                kind = _SIDE
-            if draw >= 0.80:
-                kind = _TURN
-            if count > 0:
-                i = integer(state, count)
-                propose_change(kind, rectangles[i], new, state)
-                if _inside(new, births):
-                    rest = -own[i] - model.overlap * _common(rectangles, count, fixed, rectangles[i], i, -1)
-                    alone = energy_below(small, large, new, model, limit - rest)
-                    # Overlap is never negative, so what the data refuse need not be compared with the neighbours.
-                    if alone + rest < limit:
-                        rest += model.overlap * _common(rectangles, count, fixed, new, i, -1)
-                    if alone + rest < limit:
-                        rectangles[i], own[i] = new, alone
-                        energy += alone + rest
-                        accepted = True
-        trace[row, 4 + kind] += 1
-        if accepted:
-            trace[row, 12 + kind] += 1
-            if energy < best_energy - 1e-9 and temperature < 2.0 * cold:
-                best, best_energy = rectangles[:count].copy(), energy
-        if t % stride == stride - 1 or t == proposals - 1:
-            trace[row, 0], trace[row, 1], trace[row, 2], trace[row, 3] = t + 1, temperature, energy, count
-            if energy < best_energy - 1e-9:
-                best, best_energy = rectangles[:count].copy(), energy
-    return best, rectangles[:count].copy(), trace, best_energy
+            accepted, delta = _try_change(window, chain, count, odds, kind)
+        trace[row, Trace.TRIED + kind] += 1
+        if accepted or count != before:
+            energy += delta
+            trace[row, Trace.ACCEPTED + kind] += 1
+            if energy < best_energy - _BETTER and temperature < _COLD_ENOUGH * schedule.cold:
+                best, best_energy = chain.rectangles[:count].copy(), energy
+        if t % schedule.stride == schedule.stride - 1 or t == schedule.proposals - 1:
+            trace[row, Trace.PROPOSALS], trace[row, Trace.TEMPERATURE] = t + 1, temperature
+            trace[row, Trace.ENERGY], trace[row, Trace.BUILDINGS] = energy, count
+            if energy < best_energy - _BETTER:
+                best, best_energy = chain.rectangles[:count].copy(), energy
+    return best, chain.rectangles[:count].copy(), trace, best_energy

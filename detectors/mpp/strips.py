@@ -7,32 +7,32 @@ strip
     `slender` times as long as wide or has less than `part_share` of the area of the larger one: the eaves of a roof of
     two levels, a canopy along a wall, the rest of a wing beside a penthouse. A house in a row is none.
 
-A strip is taken into the building that it lies against where the larger rectangle has less energy than that building by
-itself, and left out otherwise. So the sampled energy may rise: that no building is a strip is a rule of what a building
-is, like its least side, but one that needs the neighbours to be known.
+A strip is absorbed by the building that it lies against where the larger rectangle has less energy than that building
+by itself, and left out otherwise. So the sampled energy may rise: that no building is a strip is a rule of what a
+building is, like its least side, but one that needs the neighbours to be known.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from .energy import Model, overlaps, own_energy
-from .polish import hull
+from .arrays import Floats, Rectangles
+from .energy import Model, overlaps, rectangle_energy
 from .rectangles import corners
+from .reshaping import hull
 from .tables import Tables
 
-__all__ = ["take_in_strips"]
+__all__ = ["absorb_strips"]
 
 #: Share of a strip's long side that lies against the building, and cells that may lie between.
 _ALONG, _APART = 0.65, 1.5
 
 
-def take_in_strips(
-    tables: Tables, model: Model, rectangles: NDArray[np.float64], *, slender: float, part_share: float
-) -> NDArray[np.float64]:
-    """Return the rectangles, shape (m, 5), after strips were taken in or left out, the smallest first.
+def absorb_strips(
+    tables: Tables, model: Model, rectangles: Rectangles, *, slender: float, part_share: float
+) -> Rectangles:
+    """Return the rectangles, shape (m, 5), after strips were absorbed or left out, the smallest first.
 
     Parameters
     ----------
@@ -69,8 +69,7 @@ def take_in_strips(
         around = tree.query(shapely.polygons(corners(joined))[0], predicate="dwithin", distance=grown)
         others = result[around[kept[around] & (around != building)]]
         before, after = (
-            own_energy(tables.small, tables.large, one, model)
-            + model.overlap * overlaps(others, len(others), one, -1, -1)
+            rectangle_energy(tables, one, model) + model.overlap * overlaps(others, len(others), one, -1, -1)
             for one in (result[building], joined)
         )
         if after < before:
@@ -79,7 +78,7 @@ def take_in_strips(
     return result[kept]
 
 
-def _along(strip: NDArray[np.float64], buildings: NDArray[np.float64]) -> NDArray[np.float64]:
+def _along(strip: Rectangles, buildings: Rectangles) -> Floats:
     """Return the share of the strip's better long side that lies against each building, shape (n,)."""
     place = corners(strip)[0]
     first = 0 if strip[2] >= strip[3] else 1

@@ -27,7 +27,7 @@ from .cells import HIGH, LOW
 from .frames import lower_storeys
 from .patches import count_rims, label_patches
 from .rough import smooth_walls
-from .workers import ALONE, Workers
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["lower_superstructures"]
 
@@ -50,7 +50,7 @@ def lower_superstructures(
     share: float,
     most: int,
     rounds: int = 5,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     """Return heights and states with superstructures lowered to the roofs that carry them, and their shadows filled.
 
@@ -69,26 +69,26 @@ def lower_superstructures(
         Cells that a rough place may have to count as furniture of the roof around it.
     rounds : int
         Towers on towers that are lowered.
-    workers : Workers
+    threads : Threads
     """
     if share > 1:
         return height, state
     limit = round(100 * step)
-    lowered, state = _lower_storeys(height, state, roof, limit, workers)
-    labels, count = label_patches(lowered, roof, limit, workers=workers)
-    smooth_walls(lowered, state, labels, workers=workers)
-    if _fill_rough(lowered, state, labels, share, most, workers):
-        labels, count = label_patches(lowered, labels, limit, workers=workers)
+    lowered, state = _lower_storeys(height, state, roof, limit, threads)
+    labels, count = label_patches(lowered, roof, limit, threads=threads)
+    smooth_walls(lowered, state, labels, threads=threads)
+    if _fill_rough(lowered, state, labels, share, most, threads):
+        labels, count = label_patches(lowered, labels, limit, threads=threads)
     for turn in range(rounds):
         if turn > 0:
-            labels, count = label_patches(lowered, labels, limit, workers=workers)
-        if not _lower(lowered, state, labels, count, share, limit, workers):
+            labels, count = label_patches(lowered, labels, limit, threads=threads)
+        if not _lower(lowered, state, labels, count, share, limit, threads):
             break
     return lowered, state
 
 
 def _lower_storeys(
-    height: NDArray[np.int32], state: NDArray[np.uint8], roof: NDArray[np.bool_], step: int, workers: Workers
+    height: NDArray[np.int32], state: NDArray[np.uint8], roof: NDArray[np.bool_], step: int, threads: Threads
 ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     """Return heights and states with the storeys of frames lowered."""
     rows, columns = state.shape
@@ -103,20 +103,20 @@ def _lower_storeys(
         )
         _add_ledges(height, state, roof, first, last, solid)
 
-    workers.bands(begin, rows)
-    labels, count = label_patches(smooth, solid, step, workers=workers)
-    smooth_walls(smooth, state, labels, workers=workers)
-    workers.bands(lambda first, last: np.equal(state[first:last], HIGH, out=solid[first:last]), rows)
-    workers.bands(lambda first, last: _add_shadows(state, first, last, solid), rows)
-    workers.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
+    threads.bands(begin, rows)
+    labels, count = label_patches(smooth, solid, step, threads=threads)
+    smooth_walls(smooth, state, labels, threads=threads)
+    threads.bands(lambda first, last: np.equal(state[first:last], HIGH, out=solid[first:last]), rows)
+    threads.bands(lambda first, last: _add_shadows(state, first, last, solid), rows)
+    threads.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
     boxes = np.concatenate(
         [
-            propose_boxes(smooth, solid, steps=(1e6,), least_cells=24, workers=workers),
-            propose_boxes(smooth, labels, steps=(0.01 * step,), least_cells=24, workers=workers),
+            propose_boxes(smooth, solid, steps=(1e6,), least_cells=24, threads=threads),
+            propose_boxes(smooth, labels, steps=(0.01 * step,), least_cells=24, threads=threads),
         ]
     )
     boxes = boxes[np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")]
-    lower_storeys(lowered, filled, smooth, labels, count, boxes, step, workers=workers)
+    lower_storeys(lowered, filled, smooth, labels, count, boxes, step, threads=threads)
     return lowered, filled
 
 
@@ -160,7 +160,7 @@ def _fill_rough(
     labels: NDArray[np.int32],
     share: float,
     most: int,
-    workers: Workers,
+    threads: Threads,
 ) -> bool:
     """Level rough places that roof surrounds, in place; return whether there was any."""
     rough = np.empty(labels.shape, dtype=np.bool_)
@@ -168,10 +168,10 @@ def _fill_rough(
     def begin(first: int, last: int) -> None:
         np.logical_and(state[first:last] == HIGH, labels[first:last] == 0, out=rough[first:last])
 
-    workers.bands(begin, len(rough))
-    places, count = label_patches(height, rough, _ANY, workers=workers)
-    rims = count_rims(places, count, height, state, labels, fall=-_ANY, workers=workers)
-    return _sink(height, labels, places, rims.carried(share) & (rims.cells <= most), _ANY, workers)
+    threads.bands(begin, len(rough))
+    places, count = label_patches(height, rough, _ANY, threads=threads)
+    rims = count_rims(places, count, height, state, labels, fall=-_ANY, threads=threads)
+    return _sink(height, labels, places, rims.carried(share) & (rims.cells <= most), _ANY, threads)
 
 
 def _lower(
@@ -181,11 +181,11 @@ def _lower(
     count: int,
     share: float,
     step: int,
-    workers: Workers,
+    threads: Threads,
 ) -> bool:
     """Lower the superstructures in place; return whether there was any."""
-    rims = count_rims(labels, count, height, state, labels, fall=1, workers=workers)
-    return _sink(height, labels, labels, rims.carried(share), -step // 2, workers)
+    rims = count_rims(labels, count, height, state, labels, fall=1, threads=threads)
+    return _sink(height, labels, labels, rims.carried(share), -step // 2, threads)
 
 
 def _sink(
@@ -194,7 +194,7 @@ def _sink(
     patches: NDArray[np.int32],
     sinking: NDArray[np.bool_],
     above: int,
-    workers: Workers,
+    threads: Threads,
 ) -> bool:
     """Give the cells of some patches the height of the roof beside them, in place; return whether there was any.
 
@@ -204,8 +204,8 @@ def _sink(
     if not sinking.any():
         return False
     waiting = np.empty(labels.shape, dtype=np.uint8)
-    workers.bands(lambda first, last: _choose(patches, sinking, first, last, waiting), len(waiting))
-    rings = workers.bands(lambda first, last: _outer_ring(height, labels, waiting, first, last, above), len(waiting))
+    threads.bands(lambda first, last: _choose(patches, sinking, first, last, waiting), len(waiting))
+    rings = threads.bands(lambda first, last: _outer_ring(height, labels, waiting, first, last, above), len(waiting))
     _sink_rings(height, labels, waiting, np.concatenate(rings), above)
     return True
 

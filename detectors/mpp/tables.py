@@ -19,13 +19,14 @@ and the true value fits 32 bits as long as no rectangle reaches over more than `
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from .workers import ALONE, Workers
+from .arrays import Heights, Mask, Scores
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["LONGEST", "MILLI", "NO_TABLES", "TALLEST", "Tables", "make_tables", "part_sums"]
 
@@ -35,8 +36,7 @@ MILLI = 1000.0
 LONGEST, TALLEST = 512, 65535
 
 
-@dataclass(frozen=True, eq=False)
-class Tables:
+class Tables(NamedTuple):
     """Row prefix sums of one grid; see the module for the columns."""
 
     small: NDArray[np.int32]
@@ -48,16 +48,16 @@ class Tables:
         return self.small.shape[0], self.small.shape[1] - 1
 
 
-#: Those of no cells: what is left of tables that have served.
+#: Tables of no cells, to release those that are no longer needed.
 NO_TABLES = Tables(np.empty((0, 1, 8), dtype=np.int32), np.empty((0, 1, 4), dtype=np.int64))
 
 
 def make_tables(
-    height: NDArray[np.int32] | NDArray[np.uint16],
-    high: NDArray[np.bool_],
-    score: NDArray[np.int16],
+    height: Heights | NDArray[np.uint16],
+    high: Mask,
+    score: Scores,
     *,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> Tables:
     """Sum up the rows.
 
@@ -68,24 +68,26 @@ def make_tables(
     high : ndarray of bool, shape (rows, columns)
     score : ndarray of int16, shape (rows, columns)
         Thousandths of a nat.
-    workers : Workers
+    threads : Threads
     """
     rows, columns = height.shape
     large = np.empty((rows, columns + 1, 4), dtype=np.int64)
-    small = large.view(np.int32)
-    workers.bands(lambda first, last: _sum_rows(height, high, score, first, last, small, large), rows)
-    return Tables(small, large)
+    tables = Tables(large.view(np.int32), large)
+    threads.bands(lambda first, last: _sum_rows(height, high, score, first, last, tables), rows)
+    return tables
 
 
 @kernel(inline="always")
-def part_sums(small, large, row, first, last, x0):  # type: ignore[no-untyped-def]
+def part_sums(tables: Tables, row: int, first: int, last: int, x0: int) -> tuple[Any, ...]:
     """Return n, sums of x, xx, h, xh, hh of the cells first..last of a row, x counted from column x0."""
+    small, large = tables.small, tables.large
     n = np.int64(small[row, last, 0]) - small[row, first, 0]
     x = np.int64(small[row, last, 1]) - small[row, first, 1]
     h = np.int64(small[row, last, 2]) - small[row, first, 2]
     xx = np.int64(small[row, last, 4]) - small[row, first, 4]
     xh = np.int64(small[row, last, 5]) - small[row, first, 5]
     hh = large[row, last, 3] - large[row, first, 3]
+    # Truncation to 32 bits takes the difference modulo 2^32.
     return (
         n,
         np.int64(np.int32(x - x0 * n)),
@@ -97,7 +99,11 @@ def part_sums(small, large, row, first, last, x0):  # type: ignore[no-untyped-de
 
 
 @kernel
-def _sum_rows(height, high, score, first, last, small, large):  # type: ignore[no-untyped-def]
+def _sum_rows(
+    height: Heights | NDArray[np.uint16], high: Mask, score: Scores, first: int, last: int, tables: Tables
+) -> None:
+    """Fill the tables of some rows."""
+    small, large = tables.small, tables.large
     columns = height.shape[1]
     for r in range(first, last):
         zero = np.int64(0)

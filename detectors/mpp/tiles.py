@@ -1,4 +1,4 @@
-"""A city as many small jobs that give one result, whatever the number and order of workers.
+"""A city as many small jobs that give one result, whatever the number and order of threads.
 
 Nouns
 -----
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scenes.geodata.raster import Grid
-from .workers import ALONE, Workers
+from .threads import ONE_THREAD, Threads
 
 __all__ = ["Tile", "tiles_of", "work_off"]
 
@@ -107,7 +107,7 @@ def work_off(
     job: Callable[[Tile, _Rectangles, _Rectangles], _Rectangles],
     *,
     reach: float,
-    workers: Workers = ALONE,
+    threads: Threads = ONE_THREAD,
 ) -> _Rectangles:
     """Run a job per tile, colour by colour, and return all rectangles.
 
@@ -120,7 +120,7 @@ def work_off(
         ``job(tile, own, fixed)`` returns the tile's new rectangles, centred in it.
     reach : float
         Width of the halo, cells; less than a tile, so that tiles of one colour are independent.
-    workers : Workers
+    threads : Threads
     """
     held = start
     for colour in range(4):
@@ -130,7 +130,7 @@ def work_off(
         def run(tile: Tile, before: _Rectangles = before) -> _Rectangles:
             return job(tile, before[tile.owns(before)], before[tile.sees(before, reach)])
 
-        found = workers.map(run, batch)
+        found = threads.map(run, batch)
         kept = np.ones(len(held), dtype=bool)
         for tile in batch:
             kept &= ~tile.owns(held)

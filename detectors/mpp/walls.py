@@ -13,7 +13,11 @@ import math
 import numpy as np
 
 from ...core.kernels import kernel
-from .energy import energy_below, overlaps, own_energy
+from .arrays import Rectangles
+from .energy import Model, energy_below, overlaps, rectangle_energy
+from .reshaping import move_edge
+from .tables import Tables
+from .windows import Window
 
 __all__ = ["close_walls"]
 
@@ -24,42 +28,45 @@ _CONTACT = 1e-3
 
 
 @kernel
-def _moved(rectangle, edge, by, new):  # type: ignore[no-untyped-def]
-    """Fill the rectangle with one edge (0, 1: ends of u; 2, 3: ends of v) moved outwards by some cells."""
-    new[:] = rectangle
-    axis, end = edge // 2, 1.0 if edge % 2 == 0 else -1.0
-    cos, sin = math.cos(rectangle[4]), math.sin(rectangle[4])
-    new[2 + axis] += by
-    shift = 0.5 * end * by
-    new[0] += shift * (cos if axis == 0 else -sin)
-    new[1] += shift * (sin if axis == 0 else cos)
-
-
-@kernel
-def close_walls(small, large, model, rectangles, tolerance):  # type: ignore[no-untyped-def]
+def close_walls(tables: Tables, model: Model, rectangles: Rectangles, tolerance: float) -> None:
     """Move the edges of rectangles, shape (n, 5), in place, one building after the other.
 
     Parameters
     ----------
-    small, large : tables
+    tables : Tables
     model : Model
     rectangles : ndarray, shape (n, 5)
     tolerance : float
         How much the energy of a building by itself may rise with one edge.
     """
-    new = np.empty(5)
     others = np.empty_like(rectangles)
     for i in range(len(rectangles)):
         count = _neighbours(rectangles, i, others)
+        # The neighbours do not move while this building does.
+        window = Window(tables, model, np.empty(4), others[:count])
         for edge in range(4):
-            if overlaps(others, count, rectangles[i], -1, -1) > _CONTACT:
-                _back(small, large, model, rectangles, i, others[:count], edge, tolerance, new)
+            if _common(window, rectangles[i]) > _CONTACT:
+                _move_back(window, rectangles[i], edge, tolerance)
         for edge in range(4):
-            _out(small, large, model, rectangles, i, others[:count], edge, tolerance, new)
+            _move_out(window, rectangles[i], edge, tolerance)
 
 
 @kernel
-def _neighbours(rectangles, i, others):  # type: ignore[no-untyped-def]
+def _common(window: Window, rectangle: Rectangles) -> float:
+    """Return the area that a rectangle shares with its neighbours."""
+    return float(overlaps(window.fixed, len(window.fixed), rectangle, -1, -1))
+
+
+@kernel
+def _accept(window: Window, rectangle: Rectangles, new: Rectangles, tolerance: float) -> None:
+    """Replace a rectangle, in place, where its energy does not rise by more than the tolerance."""
+    limit = rectangle_energy(window.tables, rectangle, window.model) + tolerance
+    if energy_below(window.tables, new, window.model, limit) < limit:
+        rectangle[:] = new
+
+
+@kernel
+def _neighbours(rectangles: Rectangles, i: int, others: Rectangles) -> int:
     """Fill `others` with the buildings that building i can meet when its edges move; return their number."""
     count = 0
     reach = 0.5 * math.hypot(rectangles[i, 2], rectangles[i, 3]) + 4.0 * _REACH
@@ -73,50 +80,48 @@ def _neighbours(rectangles, i, others):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _back(small, large, model, rectangles, i, others, edge, tolerance, new):  # type: ignore[no-untyped-def]
-    """Move an edge back where that takes away most of the common area within reach."""
-    shared = overlaps(others, len(others), rectangles[i], -1, -1)
-    _moved(rectangles[i], edge, -_REACH, new)
-    if new[2 + edge // 2] < model.least_side or overlaps(others, len(others), new, -1, -1) > 0.5 * shared:
+def _move_back(window: Window, rectangle: Rectangles, edge: int, tolerance: float) -> None:
+    """Move an edge back, in place, where that takes away most of the common area within reach."""
+    new = np.empty(5)
+    shared = _common(window, rectangle)
+    move_edge(rectangle, edge, -_REACH, new)
+    if new[2 + edge // 2] < window.model.least_side or _common(window, new) > 0.5 * shared:
         return
-    least = overlaps(others, len(others), new, -1, -1) + _CONTACT
+    least = _common(window, new) + _CONTACT
     near, far = 0.0, _REACH
     for _ in range(_HALVINGS + 3):
         middle = 0.5 * (near + far)
-        _moved(rectangles[i], edge, -middle, new)
-        if overlaps(others, len(others), new, -1, -1) > least:
+        move_edge(rectangle, edge, -middle, new)
+        if _common(window, new) > least:
             near = middle
         else:
             far = middle
-    _moved(rectangles[i], edge, -far, new)
-    limit = own_energy(small, large, rectangles[i], model) + tolerance
-    if energy_below(small, large, new, model, limit) < limit:
-        rectangles[i] = new
+    move_edge(rectangle, edge, -far, new)
+    _accept(window, rectangle, new, tolerance)
 
 
 @kernel
-def _out(small, large, model, rectangles, i, others, edge, tolerance, new):  # type: ignore[no-untyped-def]
-    """Move an edge out to the first contact within reach."""
-    base = overlaps(others, len(others), rectangles[i], -1, -1)
-    _moved(rectangles[i], edge, _REACH, new)
-    if new[2 + edge // 2] > model.largest_side or overlaps(others, len(others), new, -1, -1) <= base + _CONTACT:
+def _move_out(window: Window, rectangle: Rectangles, edge: int, tolerance: float) -> None:
+    """Move an edge out, in place, to the first contact within reach."""
+    new = np.empty(5)
+    base = _common(window, rectangle)
+    move_edge(rectangle, edge, _REACH, new)
+    if new[2 + edge // 2] > window.model.largest_side or _common(window, new) <= base + _CONTACT:
         return
     near, far = 0.0, _REACH
     for step in range(1, _STEPS + 1):
         by = _REACH * step / _STEPS
-        _moved(rectangles[i], edge, by, new)
-        if overlaps(others, len(others), new, -1, -1) > base + _CONTACT:
+        move_edge(rectangle, edge, by, new)
+        if _common(window, new) > base + _CONTACT:
             far = by
             break
         near = by
     for _ in range(_HALVINGS):
         middle = 0.5 * (near + far)
-        _moved(rectangles[i], edge, middle, new)
-        if overlaps(others, len(others), new, -1, -1) > base + _CONTACT:
+        move_edge(rectangle, edge, middle, new)
+        if _common(window, new) > base + _CONTACT:
             far = middle
         else:
             near = middle
-    _moved(rectangles[i], edge, near, new)
-    limit = own_energy(small, large, rectangles[i], model) + tolerance
-    if energy_below(small, large, new, model, limit) < limit:
-        rectangles[i] = new
+    move_edge(rectangle, edge, near, new)
+    _accept(window, rectangle, new, tolerance)

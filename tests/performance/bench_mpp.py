@@ -35,10 +35,10 @@ STAGES = {
     "superstructures": ("preparation", "lower_superstructures"),
     "tables": ("preparation", "make_tables"),
     "boxes": ("preparation", "propose_boxes"),
-    "energies of boxes": ("preparation", "own_energies"),
-    "polish of tiles": ("annealing", "polish"),
+    "energies of boxes": ("preparation", "_rated"),
+    "local search of tiles": ("annealing", "local_search"),
     "chains": ("annealing", "run_chain"),
-    "polish of seams": ("city", "polish"),
+    "local search of seams": ("city", "search"),
     "walls": ("city", "close_walls"),
     "footprints": ("mpp_detector", "as_buildings"),
 }
@@ -120,12 +120,14 @@ def stages(scenes, repeats):
 
 def moves(scenes, repeats):
     """Chains of the tile with most boxes, with the shares of the moves changed."""
+    from roofbench.detectors.mpp.sampler import Trace
+
     annealing = module("annealing")
     run_chain = annealing.run_chain
     calls = []
 
     def kept(*args):
-        calls.append((*args[:6], args[6].copy(), *args[7:]))
+        calls.append((*args[:5], args[5].copy()))
         return run_chain(*args)
 
     print("\nproposals a second of the tile with most boxes (shares of births + deaths, splits + merges; accepted)")
@@ -134,26 +136,18 @@ def moves(scenes, repeats):
         annealing.run_chain = kept
         detect(scene)
         annealing.run_chain = run_chain
-        args = max(calls, key=lambda call: len(call[3].boxes))
-        mixes = {"as by default": args[11:13], "births and deaths": (0.98, 0.0), "splits and merges": (0.0, 0.98)}
+        window, births, start, schedule, capacity, state = max(calls, key=lambda call: len(call[1].boxes))
+        mixes = {"as by default": (schedule.jump_share, schedule.split_share)}
+        mixes |= {"births and deaths": (0.98, 0.0), "splits and merges": (0.0, 0.98)}
         mixes["shifts, edges, sides, turns"] = (0.0, 0.0)
         for label, (jump, split) in mixes.items():
             rates = []
+            changed = schedule._replace(proposals=20000, jump_share=jump, split_share=split, stride=20000)
             for _ in range(repeats):
-                changed = [
-                    *args[:6],
-                    args[6].copy(),
-                    20000,
-                    *args[8:11],
-                    float(jump),
-                    float(split),
-                    *args[13:15],
-                    20000,
-                ]
                 began = time.process_time()
-                _, _, trace, _ = run_chain(*changed)
+                _, _, trace, _ = run_chain(window, births, start, changed, capacity, state.copy())
                 rates.append(20000 / (time.process_time() - began))
-            accepted = trace[:, 12:].sum() / trace[:, 4:12].sum()
+            accepted = trace[:, Trace.ACCEPTED :].sum() / trace[:, Trace.TRIED : Trace.ACCEPTED].sum()
             rate = statistics.median(rates)
             print(f"  {scene.name:14s}{label:30s}{rate:12,.0f}/s  ({jump:.2f}, {split:.2f}; {accepted:.1%})")
 
@@ -236,13 +230,13 @@ def threads(scenes, repeats):
 
 def span(scenes, repeats):
     """Two free cores, on a machine that has none: jobs are done one by one and laid out on two cores on paper."""
-    from roofbench.detectors.mpp.workers import Workers
+    from roofbench.detectors.mpp.threads import Threads
 
     print("\nCPU seconds of all, and of the longer of two cores when each job goes to the core that is free first")
-    saved, held = [0.0], Workers.map
+    saved, held = [0.0], Threads.map
 
-    def laid_out(workers, function, jobs):
-        results, cores, total = [], [0.0] * workers.count, 0.0
+    def laid_out(threads, function, jobs):
+        results, cores, total = [], [0.0] * threads.count, 0.0
         for job in jobs:
             began = time.process_time()
             results.append(function(job))
@@ -254,13 +248,13 @@ def span(scenes, repeats):
 
     for scene, _ in scenes:
         rows = []
-        Workers.map = laid_out
+        Threads.map = laid_out
         for _ in range(repeats):
             saved[0], began = 0.0, time.process_time()
             detect(scene, threads=2)
             whole = time.process_time() - began
             rows.append((whole, whole - saved[0]))
-        Workers.map = held
+        Threads.map = held
         whole, longer = min(rows)
         print(f"  {scene.name:18s} {whole:.3f}, {longer:.3f} s: {whole / longer:.2f} times as fast", flush=True)
 

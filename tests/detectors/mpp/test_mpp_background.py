@@ -7,7 +7,7 @@ from naive import mpp as naive
 from roofbench.detectors.mpp.background import Background, estimate_background, fitted_cells, mean_evidence, restrain
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, Cells, cell_size
 from roofbench.detectors.mpp.rectangles import inside_any
-from roofbench.detectors.mpp.workers import some_workers
+from roofbench.detectors.mpp.threads import started_threads
 from roofbench.scenes.geodata.raster import Grid
 
 
@@ -43,9 +43,9 @@ def test_classes_and_fitted_cells_are_those_of_the_evidence_for_any_number_of_th
     openness = np.where(rough, rng.integers(0, 256, state.shape), 3).astype(np.uint8)
     cells = Cells(grid, np.where(state == HIGH, height, 0).astype(np.int32), state, openness)
     alone, bins = estimate_background(cells)
-    with some_workers(count) as workers:
-        background, same = estimate_background(cells, workers=workers)
-        fitted = fitted_cells(cells, bins, background, texture_weight=1.0, texture_limit=3.0, workers=workers)
+    with started_threads(count) as threads:
+        background, same = estimate_background(cells, threads=threads)
+        fitted = fitted_cells(cells, bins, background, texture_weight=1.0, texture_limit=3.0, threads=threads)
     assert background == alone
     np.testing.assert_array_equal(same, bins)
     evidence = np.array(background.evidence).ravel()

@@ -13,14 +13,14 @@ from roofbench.detectors.mpp.patches import cells_of_patches, count_rims, label_
 from roofbench.detectors.mpp.rectangles import corners
 from roofbench.detectors.mpp.rough import smooth_walls
 from roofbench.detectors.mpp.superstructures import _sink, lower_superstructures
-from roofbench.detectors.mpp.workers import some_workers
+from roofbench.detectors.mpp.threads import started_threads
 
 SHAPES = [(1, 1), (1, 9), (2, 30), (40, 1), (33, 47)]
 
 
 @pytest.fixture(params=[1, 2, 3, 7])
-def workers(request):
-    with some_workers(request.param) as threads:
+def threads(request):
+    with started_threads(request.param) as threads:
         yield threads
 
 
@@ -58,37 +58,37 @@ def town(seed=0, size=220):
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
 @pytest.mark.parametrize("step", [0, 25, 130, 1 << 30])
-def test_patches_are_numbered_by_their_first_cells(shape, step, workers):
+def test_patches_are_numbered_by_their_first_cells(shape, step, threads):
     height, _, mask = terraces(shape)
     expected, count = naive.label_patches(height, mask, step)
     for chosen in (mask, 5 * mask.astype(np.int32)):
-        labels, found = label_patches(height, chosen, step, workers=workers)
+        labels, found = label_patches(height, chosen, step, threads=threads)
         np.testing.assert_array_equal(labels, expected)
         assert found == count
 
 
-def test_a_spiral_that_meets_every_band_again_and_again_is_one_patch(workers):
+def test_a_spiral_that_meets_every_band_again_and_again_is_one_patch(threads):
     mask = np.zeros((41, 41), bool)
     for ring in range(0, 20, 2):
         mask[ring, ring : 41 - ring] = mask[40 - ring, ring : 41 - ring] = True
         mask[ring : 41 - ring, 40 - ring] = mask[ring + 2 : 41 - ring, ring] = True
         mask[ring + 2, ring : ring + 2] = True
-    labels, count = label_patches(np.zeros(mask.shape, np.int32), mask, 0, workers=workers)
+    labels, count = label_patches(np.zeros(mask.shape, np.int32), mask, 0, threads=threads)
     assert count == 1
     np.testing.assert_array_equal(labels, mask)
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_cells_and_rims_of_patches_are_those_of_the_oracle(shape, workers):
+def test_cells_and_rims_of_patches_are_those_of_the_oracle(shape, threads):
     height, state, mask = terraces(shape, 1)
     labels, count = naive.label_patches(height, mask, 25)
-    cells, starts = cells_of_patches(labels, count, workers=workers)
+    cells, starts = cells_of_patches(labels, count, threads=threads)
     for k in range(count):
         np.testing.assert_array_equal(cells[starts[k] : starts[k + 1]], np.argwhere(labels == k + 1))
-    np.testing.assert_array_equal(patch_sizes(labels, count, workers=workers)[1:], np.diff(starts))
+    np.testing.assert_array_equal(patch_sizes(labels, count, threads=threads)[1:], np.diff(starts))
     roof = np.where(height < 300, labels, 0).astype(np.int32)
     for fall in (1, -(1 << 30)):
-        found = count_rims(labels, count, height, state, roof, fall=fall, workers=workers)
+        found = count_rims(labels, count, height, state, roof, fall=fall, threads=threads)
         names = np.arange(count + 1)
         for values, expected in zip(
             (found.cells, found.length, found.roof), naive.rims(labels, height, state, roof, fall), strict=True
@@ -96,40 +96,40 @@ def test_cells_and_rims_of_patches_are_those_of_the_oracle(shape, workers):
             np.testing.assert_array_equal(values, [expected[name] for name in names])
 
 
-def test_walls_are_eaten_up_round_by_round(workers):
+def test_walls_are_eaten_up_round_by_round(threads):
     height, state, roof = town(2, 60)
     roof &= np.random.default_rng(3).random(roof.shape) < 0.75
     labels, _ = naive.label_patches(height, roof, 100)
     expected = naive.smooth_walls(height, state, labels, HIGH)
-    smooth_walls(height, state, labels, workers=workers)
+    smooth_walls(height, state, labels, threads=threads)
     np.testing.assert_array_equal(height, expected[0])
     np.testing.assert_array_equal(labels, expected[1])
 
 
 @pytest.mark.parametrize("above", [-50, 1 << 30])
-def test_cells_sink_ring_by_ring(above, workers):
+def test_cells_sink_ring_by_ring(above, threads):
     height, _, roof = town(4, 60)
     labels, count = naive.label_patches(height, roof, 100)
     sinking = np.random.default_rng(5).random(count + 1) < 0.3
     sinking[0] = False
     expected = naive.sink(height, labels, sinking[labels], above)
     assert (expected != height).any()
-    assert _sink(height, labels, labels.copy(), sinking, above, workers)
+    assert _sink(height, labels, labels.copy(), sinking, above, threads)
     np.testing.assert_array_equal(height, expected)
-    assert not _sink(height, labels, labels.copy(), np.zeros_like(sinking), above, workers)
+    assert not _sink(height, labels, labels.copy(), np.zeros_like(sinking), above, threads)
 
 
-def test_boxes_and_superstructures_do_not_depend_on_the_number_of_threads(workers):
+def test_boxes_and_superstructures_do_not_depend_on_the_number_of_threads(threads):
     height, state, roof = town()
     boxes = propose_boxes(height, roof, steps=(0.4, 1.0, 1000.0), least_cells=20)
     assert len(boxes) > 60
     np.testing.assert_array_equal(
-        propose_boxes(height, roof, steps=(0.4, 1.0, 1000.0), least_cells=20, workers=workers), boxes
+        propose_boxes(height, roof, steps=(0.4, 1.0, 1000.0), least_cells=20, threads=threads), boxes
     )
     alone = lower_superstructures(height, state, roof, step=1.0, share=0.65, most=40)
     assert (alone[0] < height).sum() > 1000
     assert (alone[1] != state).any()
-    found = lower_superstructures(height, state, roof, step=1.0, share=0.65, most=40, workers=workers)
+    found = lower_superstructures(height, state, roof, step=1.0, share=0.65, most=40, threads=threads)
     np.testing.assert_array_equal(found[0], alone[0])
     np.testing.assert_array_equal(found[1], alone[1])
 

@@ -7,22 +7,24 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from roofbench.detectors.mpp.births import birth_density, make_births, no_births, propose_birth
-from roofbench.detectors.mpp.energy import Model, configuration_energy, own_energies
+from roofbench.detectors.mpp.births import birth_density, make_births, propose_birth
+from roofbench.detectors.mpp.energy import Model, configuration_energy, rectangle_energies
+from roofbench.detectors.mpp.local_search import local_search
 from roofbench.detectors.mpp.moves import (
     GAP,
-    MOVES,
     OFFSET,
     SKEW,
+    Auxiliary,
+    Move,
     birth_log_ratio,
     merge_rectangles,
     split_rectangle,
 )
-from roofbench.detectors.mpp.polish import polish
 from roofbench.detectors.mpp.random_stream import gaussian, stream, uniform
 from roofbench.detectors.mpp.rectangles import corners
-from roofbench.detectors.mpp.sampler import run_chain
-from roofbench.detectors.mpp.tables import make_tables
+from roofbench.detectors.mpp.sampler import ChainSchedule, Trace, run_chain
+from roofbench.detectors.mpp.tables import NO_TABLES, make_tables
+from roofbench.detectors.mpp.windows import Window, window_energy
 
 NONE, NO_ENERGIES = np.empty((0, 5)), np.empty(0)
 WINDOW = (0.0, 0.0, 40.0, 40.0)
@@ -59,26 +61,26 @@ def houses():
     return make_tables(height, high, np.where(high, 3000, -3000).astype(np.int16))
 
 
-def chain(tables, births, proposals, seed=0, start=NONE, hot=1.0, cold=1.0, intensity=3 / 1600, stride=50, **more):
-    settings = {"jump": 0.4, "split": 0.2, "model": model(), **more}
-    return run_chain(
-        tables.small,
-        tables.large,
-        settings["model"],
-        births,
-        start,
-        NONE,
-        stream([seed]),
-        proposals,
-        hot,
-        cold,
-        intensity,
-        settings["jump"],
-        settings["split"],
-        20.0,
-        200,
-        stride,
-    )
+def window(tables=NO_TABLES, energy=None, fixed=NONE, edges=WINDOW):
+    return Window(tables, energy or model(), np.array(edges), fixed)
+
+
+def births_of(boxes=NONE, share=0.0):
+    return make_births(window(), boxes, np.ones(len(boxes)), share)
+
+
+def chain(tables, births, proposals, seed=0, start=NONE, energy=None, **changes):
+    values = {
+        "proposals": proposals,
+        "hot": 1.0,
+        "cold": 1.0,
+        "intensity": 3 / 1600,
+        "jump_share": 0.4,
+        "split_share": 0.2,
+        "merge_reach": 20.0,
+        "stride": 50,
+    }
+    return run_chain(window(tables, energy), births, start, ChainSchedule(**{**values, **changes}), 200, stream([seed]))
 
 
 def test_random_numbers_are_uniform_normal_and_reproducible():
@@ -100,7 +102,7 @@ def test_detailed_balance_of_births_and_deaths_over_all_subsets_of_four_rectangl
 
     def energy(state):
         held = rectangles[np.array(state, bool)]
-        return configuration_energy(tables.small, tables.large, held, len(held), NONE, model())
+        return configuration_energy(tables, held, len(held), NONE, model())
 
     def target(state):
         return density ** sum(state) * math.exp(-energy(state) / temperature)
@@ -127,7 +129,7 @@ def test_detailed_balance_of_births_and_deaths_over_all_subsets_of_four_rectangl
 
 def test_births_are_drawn_with_the_density_that_deaths_use():
     """Importance sampling: the mean of 1/q over draws is the volume of all allowed rectangles."""
-    births = make_births(WINDOW, SIDES, BOXES, np.array([1.0, 2.0, 3.0]), 0.5)
+    births = make_births(window(), BOXES, np.array([1.0, 2.0, 3.0]), 0.5)
     state = stream([7])
     rectangle = np.empty(5)
     weights = []
@@ -144,14 +146,15 @@ def test_births_are_drawn_with_the_density_that_deaths_use():
 
 def test_merge_undoes_split():
     rng = np.random.default_rng(1)
-    first, second, parent, auxiliary = np.empty(5), np.empty(5), np.empty(5), np.empty(5)
+    first, second, parent = np.empty(5), np.empty(5), np.empty(5)
     for _ in range(300):
         axis = int(rng.integers(2))
         whole = np.array([20, 20, rng.uniform(10, 20), rng.uniform(10, 20), rng.uniform(0, math.pi)])
-        numbers = [rng.uniform(-3, 3), *(rng.uniform(-1, 1, 4) * (GAP, OFFSET / 2, OFFSET / 2, SKEW))]
-        split_rectangle(whole, axis, *numbers, first, second)
+        numbers = Auxiliary(rng.uniform(-3, 3), *(rng.uniform(-1, 1, 4) * (GAP, OFFSET / 2, OFFSET / 2, SKEW)))
+        split_rectangle(whole, axis, numbers, first, second)
         for pair in ((first, second), (second, first)):
-            assert merge_rectangles(*pair, axis, parent, auxiliary)
+            found, auxiliary = merge_rectangles(*pair, axis, parent)
+            assert found
             np.testing.assert_allclose(
                 np.sort(corners(parent)[0], axis=0), np.sort(corners(whole)[0], axis=0), atol=1e-9
             )
@@ -164,7 +167,7 @@ def test_the_map_of_a_split_has_jacobian_eight():
 
     def image(point, axis):
         first, second = np.empty(5), np.empty(5)
-        split_rectangle(point[:5], axis, *point[5:], first, second)
+        split_rectangle(point[:5], axis, Auxiliary(*point[5:]), first, second)
         return np.concatenate([first, second])
 
     for axis in (0, 1):
@@ -174,7 +177,7 @@ def test_the_map_of_a_split_has_jacobian_eight():
         assert abs(np.linalg.det(np.array(columns))) == pytest.approx(8.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("births", [no_births(WINDOW, SIDES), make_births(WINDOW, SIDES, BOXES, np.ones(3), 0.5)])
+@pytest.mark.parametrize("births", [births_of(), births_of(BOXES, 0.5)])
 def test_without_data_the_prior_comes_back(births):
     """Flat likelihood: Poisson number of buildings, uniform marks; with all moves, with and without boxes."""
     tables = houses()
@@ -182,7 +185,7 @@ def test_without_data_the_prior_comes_back(births):
     counts, marks = [], []
     state = NONE
     for block in range(1500):
-        _, state, _, _ = chain(tables, births, 200, block, state, model=flat, stride=200)
+        _, state, _, _ = chain(tables, births, 200, block, state, flat, stride=200)
         counts.append(len(state))
         marks.append(state)
     counts = np.array(counts[20:])
@@ -196,26 +199,22 @@ def test_without_data_the_prior_comes_back(births):
 
 def test_the_energy_that_the_chain_adds_up_is_that_of_its_state():
     tables = houses()
-    births = make_births(WINDOW, SIDES, BOXES, np.ones(3), 0.6)
+    births = births_of(BOXES, 0.6)
     for seed in range(5):
         best, last, trace, best_energy = chain(tables, births, 5000, seed, hot=20.0, cold=0.5, stride=5000)
-        fresh = [
-            configuration_energy(tables.small, tables.large, state, len(state), NONE, model()) for state in (best, last)
-        ]
+        fresh = [window_energy(window(tables), state) for state in (best, last)]
         assert best_energy == pytest.approx(fresh[0], abs=1e-6)
-        assert trace[-1, 2] == pytest.approx(fresh[1], abs=1e-6)
-        assert trace[-1, 3] == len(last)
-        assert trace[:, 4:12].sum() == 5000
-        assert (trace[:, 12:] <= trace[:, 4:12]).all()
-        assert len(MOVES) == 8
+        assert trace[-1, Trace.ENERGY] == pytest.approx(fresh[1], abs=1e-6)
+        assert trace[-1, Trace.BUILDINGS] == len(last)
+        assert trace[:, Trace.TRIED : Trace.ACCEPTED].sum() == 5000
+        assert (trace[:, Trace.ACCEPTED :] <= trace[:, Trace.TRIED : Trace.ACCEPTED]).all()
+        assert len(Move) == Trace.ACCEPTED - Trace.TRIED == Trace.COLUMNS - Trace.ACCEPTED
 
 
 def test_annealing_finds_three_roofs_with_the_party_wall_between_two():
     tables = houses()
-    best, _, _, _ = chain(tables, no_births(WINDOW, SIDES), 120000, 3, hot=20.0, cold=0.1)
-    rectangles, gained = polish(
-        tables.small, tables.large, model(), np.array(WINDOW), best, NONE, NONE, NO_ENERGIES, 50, 10
-    )
+    best, _, _, _ = chain(tables, births_of(), 120000, 3, hot=20.0, cold=0.1)
+    rectangles, gained = local_search(window(tables), best, NONE, NO_ENERGIES, 50, 10)
     assert gained >= 0
     assert len(rectangles) == 3
     order = np.argsort(rectangles[:, 0])
@@ -223,7 +222,7 @@ def test_annealing_finds_three_roofs_with_the_party_wall_between_two():
     np.testing.assert_allclose(rectangles[order, 1], [11, 11, 30], atol=0.8)
 
 
-def test_polish_never_raises_the_energy_and_says_by_how_much_it_fell():
+def test_local_search_never_raises_the_energy_and_returns_by_how_much_it_fell():
     tables = houses()
     rng = np.random.default_rng(4)
     for _ in range(10):
@@ -232,14 +231,9 @@ def test_polish_never_raises_the_energy_and_says_by_how_much_it_fell():
             [rng.uniform(5, 35, n), rng.uniform(5, 35, n), rng.uniform(2, 12, (n, 2)), rng.uniform(0, math.pi, n)]
         )
         fixed = np.array([[17.0, 11.0, 6.0, 6.0, 0.3]])
-        energies = own_energies(tables.small, tables.large, BOXES, model())
-        end, gained = polish(
-            tables.small, tables.large, model(), np.array(WINDOW), start, fixed, BOXES, energies, 50, 6
-        )
-        before, after = (
-            configuration_energy(tables.small, tables.large, state, len(state), fixed, model())
-            for state in (start, end)
-        )
+        energies = rectangle_energies(tables, BOXES, model())
+        end, gained = local_search(window(tables, fixed=fixed), start, BOXES, energies, 50, 6)
+        before, after = (window_energy(window(tables, fixed=fixed), state) for state in (start, end))
         assert after <= before + 1e-9
         assert before - after == pytest.approx(gained, abs=1e-6)
 
@@ -252,7 +246,7 @@ def hall():
     return make_tables(height, height > 0, np.where(height > 0, 3000, -5000).astype(np.int16))
 
 
-def test_a_hall_takes_in_its_pieces_and_says_by_how_much_the_energy_fell():
+def test_a_hall_absorbs_its_pieces_and_the_gain_is_the_fall_of_the_energy():
     tables, large = hall(), model(cell=1.0, weight=1.0, overlap=20.0, price=20.0, largest_side=60.0)
     rng = np.random.default_rng(5)
     fixed = np.array([[42.0, 20.0, 6.0, 10.0, 0.1]])
@@ -262,12 +256,9 @@ def test_a_hall_takes_in_its_pieces_and_says_by_how_much_the_energy_fell():
         start = np.column_stack(
             [rng.uniform(10, 40, n), rng.uniform(10, 42, n), rng.uniform(3, 25, (n, 2)), rng.uniform(-0.1, 0.1, n)]
         )
-        end, gained = polish(
-            tables.small, tables.large, large, np.array((0.0, 0.0, 60.0, 60.0)), start, fixed, NONE, NO_ENERGIES, 50, 6
-        )
-        before, after = (
-            configuration_energy(tables.small, tables.large, state, len(state), fixed, large) for state in (start, end)
-        )
+        place = window(tables, large, fixed, (0.0, 0.0, 60.0, 60.0))
+        end, gained = local_search(place, start, NONE, NO_ENERGIES, 50, 6)
+        before, after = (window_energy(place, state) for state in (start, end))
         assert before - after == pytest.approx(gained, abs=1e-6)
         joined += (end[:, 2] * end[:, 3] > 600).any()
     assert joined > 0

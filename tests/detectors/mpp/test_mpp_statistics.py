@@ -10,13 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from naive import mpp as naive
 
-from roofbench.detectors.mpp.energy import Model, configuration_energy, energy_below, least_energy, own_energy
+from roofbench.detectors.mpp.energy import Model, configuration_energy, energy_below, least_energy, rectangle_energy
+from roofbench.detectors.mpp.rectangle_sums import scan, scan_halves
 from roofbench.detectors.mpp.rectangles import corners, overlap_area
-from roofbench.detectors.mpp.roofs import FLAT, GABLE_U, GABLE_V, HIP, KINDS, PLANE, fit_roof, scan, scan_halves
+from roofbench.detectors.mpp.roofs import KINDS, Roof, RoofRules, fit_roof
 from roofbench.detectors.mpp.tables import LONGEST, MILLI, TALLEST, make_tables, part_sums
 
 ROWS, COLUMNS = 40, 50
 NONE = np.empty((0, 5))
+RULES = RoofRules(price=3.0, least_tau=0.15, least_height=2.5, cell=0.5)
 
 
 def field(seed=0):
@@ -62,7 +64,7 @@ def test_moments_are_sums_over_cells():
     height, high, score = field()
     tables = make_tables(height, high, score)
     for rectangle in random_rectangles(np.random.default_rng(1), 200):
-        total, outside, *moments = scan(tables.small, tables.large, rectangle)
+        total, outside, *moments = scan(tables, rectangle)
         inside = naive.cells_inside(rectangle, ROWS, COLUMNS)
         assert total == pytest.approx(score[inside].sum() / MILLI)
         bigger = naive.cells_inside(rectangle + np.array([50, 50, 0, 0, 0]), ROWS + 100, COLUMNS + 100)
@@ -74,7 +76,7 @@ def test_moments_are_sums_over_cells():
         np.testing.assert_allclose(moments, [np.sum(values) for values in sums], rtol=1e-9, atol=1e-7)
         right, upper = a > 0, b > 0
         np.testing.assert_allclose(
-            scan_halves(tables.small, tables.large, rectangle),
+            scan_halves(tables, rectangle),
             [a[right].sum(), (a * h)[right].sum(), b[upper].sum(), (b * h)[upper].sum()],
             rtol=1e-9,
             atol=1e-7,
@@ -92,7 +94,7 @@ def test_sums_are_exact_far_from_the_left_border_where_running_sums_pass_32_bits
         x, held = np.arange(first, last) - x0, high[1, first:last]
         h = height[1, first:last].astype(np.int64)
         expected = [np.sum(values[held]) for values in (held, x, x * x, h, x * h, h * h)]
-        assert list(part_sums(tables.small, tables.large, 1, first, last, np.int64(x0))) == expected
+        assert list(part_sums(tables, 1, first, last, np.int64(x0))) == expected
 
 
 def test_an_energy_that_is_not_below_the_limit_is_given_up_and_one_below_is_exact():
@@ -100,49 +102,46 @@ def test_an_energy_that_is_not_below_the_limit_is_given_up_and_one_below_is_exac
     rng = np.random.default_rng(9)
     given_up = 0
     for rectangle in random_rectangles(rng, 300):
-        exact = own_energy(tables.small, tables.large, rectangle, model())
-        assert least_energy(tables.small, tables.large, rectangle, model()) <= exact
+        exact = rectangle_energy(tables, rectangle, model())
+        assert least_energy(tables, rectangle, model()) <= exact
         limit = exact + rng.normal(0, 50)
-        found = energy_below(tables.small, tables.large, rectangle, model(), limit)
+        found = energy_below(tables, rectangle, model(), limit)
         assert found == exact if exact < limit else found >= limit - 1e-9 * abs(limit)
         given_up += found == math.inf
     assert 0 < given_up < 300
 
 
-@pytest.mark.parametrize("kind", [FLAT, PLANE, GABLE_U, GABLE_V, HIP])
+@pytest.mark.parametrize("kind", list(Roof))
 def test_the_roof_that_stands_there_is_found_with_its_spread(kind):
     rng = np.random.default_rng(kind)
     rectangle = np.array([25.3, 20.2, 26.0, 14.0, 0.4])
     u, v = naive.frame(rectangle, ROWS, COLUMNS)
     surface = {
-        FLAT: 0 * u,
-        PLANE: 0.1 * u - 0.15 * v,
-        GABLE_U: -0.3 * np.abs(v),
-        GABLE_V: -0.3 * np.abs(u),
-        HIP: -0.4 * np.maximum(np.abs(v), np.abs(u) - 6),
+        Roof.FLAT: 0 * u,
+        Roof.PLANE: 0.1 * u - 0.15 * v,
+        Roof.GABLE_U: -0.3 * np.abs(v),
+        Roof.GABLE_V: -0.3 * np.abs(u),
+        Roof.HIP: -0.4 * np.maximum(np.abs(v), np.abs(u) - 6),
     }[kind]
     height = np.round(100 * (9 + surface + rng.normal(0, 0.2, u.shape))).astype(np.int32)
     tables = make_tables(height, np.ones(u.shape, bool), np.zeros(u.shape, np.int16))
-    fit = np.empty(5)
-    likelihood, _, _ = fit_roof(tables.small, tables.large, rectangle, 3.0, 0.15, 0.0, 2.5, 0.5, fit)
+    fit = fit_roof(tables, rectangle, RULES, 0.0)
     inside = naive.cells_inside(rectangle, ROWS, COLUMNS)
     residuals = naive.roof_residuals(0.01 * height[inside], u[inside], v[inside], 26.0, 14.0)
-    assert KINDS[int(fit[3])] == KINDS[kind]
-    assert fit[0] == inside.sum()
-    assert fit[2] == pytest.approx(math.sqrt(residuals[kind] / inside.sum()), rel=1e-6)
-    price = 3.0 * {FLAT: 0, PLANE: 2}.get(kind, 1)
-    assert likelihood == pytest.approx(naive.log_normal_sum(residuals[kind], inside.sum(), 0.15) - price, rel=1e-9)
+    assert KINDS[fit.kind] == KINDS[kind]
+    assert fit.cells == inside.sum()
+    assert fit.tau == pytest.approx(math.sqrt(residuals[kind] / inside.sum()), rel=1e-6)
+    price = 3.0 * {Roof.FLAT: 0, Roof.PLANE: 2}.get(kind, 1)
+    assert fit.likelihood == pytest.approx(naive.log_normal_sum(residuals[kind], inside.sum(), 0.15) - price, rel=1e-9)
 
 
 def test_a_flat_roof_below_the_least_height_is_measured_from_it():
     tables = make_tables(
         np.full((ROWS, COLUMNS), 220, np.int32), np.ones((ROWS, COLUMNS), bool), np.zeros((ROWS, COLUMNS), np.int16)
     )
-    fit = np.empty(5)
-    rectangle = np.array([20.0, 20.0, 10.0, 10.0, 0.0])
-    likelihood, _, _ = fit_roof(tables.small, tables.large, rectangle, 3.0, 0.15, 0.0, 2.5, 0.5, fit)
-    assert fit[2] == pytest.approx(0.3)
-    assert likelihood == pytest.approx(naive.log_normal_sum(100 * 0.3**2, 100, 0.15))
+    fit = fit_roof(tables, np.array([20.0, 20.0, 10.0, 10.0, 0.0]), RULES, 0.0)
+    assert fit.tau == pytest.approx(0.3)
+    assert fit.likelihood == pytest.approx(naive.log_normal_sum(100 * 0.3**2, 100, 0.15))
 
 
 def test_common_area_is_that_of_the_polygons():
@@ -170,7 +169,7 @@ def test_energy_does_not_change_with_shift_by_cells_quarter_turn_or_mirror(seed,
 
     def energy(height, high, score, rectangles):
         tables = make_tables(height, high, score)
-        return configuration_energy(tables.small, tables.large, rectangles, len(rectangles), NONE, model(void_price=0))
+        return configuration_energy(tables, rectangles, len(rectangles), NONE, model(void_price=0))
 
     expected = energy(height, high, score, rectangles)
     pad = ((down, 3), (right, 2))
@@ -196,5 +195,5 @@ def test_both_descriptions_of_one_shape_have_one_energy():
     for rectangle in random_rectangles(np.random.default_rng(6), 20):
         other = rectangle[[0, 1, 3, 2, 4]]
         other[4] = (other[4] + np.pi / 2) % np.pi
-        first = own_energy(tables.small, tables.large, rectangle, model())
-        assert own_energy(tables.small, tables.large, other, model()) == pytest.approx(first, rel=1e-9)
+        first = rectangle_energy(tables, rectangle, model())
+        assert rectangle_energy(tables, other, model()) == pytest.approx(first, rel=1e-9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from roofbench.detectors.mpp.energy import Model
-from roofbench.detectors.mpp.strips import take_in_strips
+from roofbench.detectors.mpp.strips import absorb_strips
 from roofbench.detectors.mpp.tables import make_tables
 
 MODEL = Model(
@@ -33,7 +33,7 @@ def tables(*roofs):
 
 
 def left_over(world, *rectangles, slender=3.0, part_share=0.1):
-    return take_in_strips(world, MODEL, np.array(rectangles), slender=slender, part_share=part_share)
+    return absorb_strips(world, MODEL, np.array(rectangles), slender=slender, part_share=part_share)
 
 
 def test_a_strip_of_the_same_roof_is_taken_in():
@@ -70,6 +70,6 @@ def test_a_strip_of_a_strip_goes_with_it():
 
 def test_nothing_lies_along_anything_in_an_empty_scene_and_with_rules_that_never_hold():
     world = tables((15, 10, 39, 40, 9.0))
-    assert take_in_strips(world, MODEL, np.empty((0, 5)), slender=3.0, part_share=0.1).shape == (0, 5)
+    assert absorb_strips(world, MODEL, np.empty((0, 5)), slender=3.0, part_share=0.1).shape == (0, 5)
     both = HALL, (25.0, 37.0, 30.0, 4.0, 0.0)
     np.testing.assert_array_equal(left_over(world, *both, slender=1000.0, part_share=0.0), both)

@@ -1,4 +1,4 @@
-"""Threads: how the work of one run is shared out.
+"""Threads: how the work of one run is divided.
 
 Kernels are compiled and hold no lock (`nogil`), so threads of one process compute at the same time. Work is cut into
 bands of rows or into jobs; each writes what no other reads, so the result has the same bits for any number of threads.
@@ -16,14 +16,14 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ALONE", "Workers", "some_workers"]
+__all__ = ["ONE_THREAD", "Threads", "started_threads"]
 
 _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, eq=False)
-class Workers:
+class Threads:
     """Some threads.
 
     Attributes
@@ -58,14 +58,14 @@ class Workers:
 
 
 #: The calling thread.
-ALONE = Workers(1, None)
+ONE_THREAD = Threads(1, None)
 
 
 @contextmanager
-def some_workers(count: int) -> Iterator[Workers]:
+def started_threads(count: int) -> Iterator[Threads]:
     """Yield that many threads; they end with the block."""
     if count == 1:
-        yield ALONE
+        yield ONE_THREAD
     else:
         with ThreadPoolExecutor(count, thread_name_prefix="mpp") as pool:
-            yield Workers(count, pool)
+            yield Threads(count, pool)
