@@ -10,6 +10,12 @@ from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 
 use_profile()
 
+
+def pytest_collection_modifyitems(items):
+    """Run the slow tests first: one worker compiles the kernels of whole detectors while the other takes the rest."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
 MISBEHAVING = f"{Path(__file__).parent / 'plugins' / 'misbehaving.py'}:Misbehaving"
 
 

@@ -249,6 +249,7 @@ def test_the_command_line_exits_0_1_and_4(cli, misbehaving, tmp_path):
     assert "Not comparable: scene hamlet-6 is only in the baseline" in other.stderr
 
 
+@pytest.mark.slow
 def test_the_gate_suite_cut_to_five_scenes_is_not_measurable(cli):
     saved = cli("baseline", "save", "-o", "b.json", "-d", "ndsm", "--scenes", "knox-small-[1-5]", "-j", 0)
     assert saved.exit_code == 0, saved.output
@@ -259,6 +260,7 @@ def test_the_gate_suite_cut_to_five_scenes_is_not_measurable(cli):
     assert "Gate nothing could be measured" in result.stdout
 
 
+@pytest.mark.slow
 def test_only_the_detectors_that_are_named_are_compared(cli, misbehaving, tmp_path):
     (tmp_path / "little.toml").write_text(
         suite_text(misbehaving, 10) + '[[detectors]]\nuse = "ndsm"\n[[detectors]]\nuse = "ndsm"\nheight = 2\n'

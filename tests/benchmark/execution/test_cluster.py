@@ -63,6 +63,7 @@ def test_limits_hold_on_a_cluster(suite, tmp_path, misbehaving):
     assert {reason for _, reason, *_ in found.values()} == {"time limit of 2 s passed"}
 
 
+@pytest.mark.slow
 def test_a_worker_killed_in_mid_run_does_not_stop_the_sweep(suite, tmp_path, misbehaving):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

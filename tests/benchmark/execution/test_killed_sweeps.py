@@ -1,6 +1,8 @@
+import pytest
 from harness.killed_sweeps import kill_and_resume
 
 
+@pytest.mark.slow
 def test_a_sweep_killed_at_ten_random_moments_resumes_to_the_same_store(tmp_path):
     at_kill, resumed, uninterrupted = kill_and_resume(tmp_path, 10, sides=10)
     assert len(at_kill) == 10

@@ -53,6 +53,7 @@ def wkb(footprints):
     return sorted(shapely.to_wkb(footprints.polygons).tolist())
 
 
+@pytest.mark.slow
 def test_houses_are_found_with_party_wall_and_roof_and_trees_are_not():
     found = detect(cloud())
     assert len(found) == 3
@@ -76,6 +77,7 @@ def test_the_record_holds_the_convergence_as_json():
     assert sum(map(sum, trace["tried"].values())) == pytest.approx(trace["proposals"][-1])
 
 
+@pytest.mark.slow
 def test_same_seed_same_bits_with_any_number_of_threads_and_tiles_worked_off_in_any_order():
     points = cloud(1)
     small = "mpp[tile=40,largest_side=20,threads={}]"
@@ -117,6 +119,7 @@ def test_nothing_is_found_where_no_building_is(points):
     assert len(make_detector("mpp").detect(Scene("no DEM", EXTENT, points=points), np.random.default_rng(0))) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dem", [True, False], ids=["DEM", "own ground"])
 def test_on_a_lake_nothing_is_found_and_the_house_on_its_shore_is(dem):
     """Water gives few returns, some of them far below: the surface must neither break nor bring forth buildings."""

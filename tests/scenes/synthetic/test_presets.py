@@ -103,6 +103,7 @@ def test_the_parts_of_fairfield_are_built_up(name):
     assert np.mean(built) > 0.8
 
 
+@pytest.mark.slow
 def test_every_seed_of_fairfield_has_room_for_its_entities():
     for name in ("fairfield-1", "fairfield-2", "fairfield-3"):
         for seed in range(100, 130):

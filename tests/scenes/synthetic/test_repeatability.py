@@ -23,6 +23,7 @@ def trees_of(name, seed=4, **parameters):
     return make_world(preset(name, **parameters), seed).trees
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits_in_other_processes_and_with_other_thread_counts():
     here = rb.make_scene("knox-small", seed=5).content_hash
     root = str(Path(rb.__file__).resolve().parent.parent)
