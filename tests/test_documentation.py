@@ -7,6 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+ROOMS = ("core", "scenes", "evaluators", "detectors", "benchmark", "reports", "cli")
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
 
@@ -64,3 +65,44 @@ def test_the_changelog_has_short_lines_under_versions():
     assert all(re.fullmatch(r"\d+\.\d+\.\d+( \((unreleased|\d{4}-\d\d-\d\d)\))?", heading) for heading in headings)
     assert [line for line in text.splitlines() if len(line) > 200] == []
     assert [line for line in text.splitlines() if line and not line.startswith(("#", "- "))] == []
+
+
+def rows_of(page):
+    """Return the cells of every table row of a page, without headings and rules."""
+    lines = [line.strip() for line in page.read_text(encoding="utf-8").splitlines()]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    return [row for row in rows if row[0] != "term" and not set(row[0]) <= set("-: ")]
+
+
+GLOSSARY = ROOT / "docs" / "reference" / "glossary.md"
+
+
+def test_the_glossary_explains_each_noun_once():
+    terms = [row[0] for row in rows_of(GLOSSARY)]
+    assert len(terms) > 50
+    assert len(set(terms)) == len(terms)
+
+
+def test_the_code_uses_the_names_of_the_glossary():
+    package = "\n".join(path.read_text(encoding="utf-8") for room in ROOMS for path in (ROOT / room).rglob("*.py"))
+    words = set(re.findall(r"\w+", package))
+    names = [name for row in rows_of(GLOSSARY) for name in re.findall(r"`(\w+)`", row[-1])]
+    assert [name for name in names if name not in words] == []
+
+
+def test_the_glossary_has_every_symbol_of_the_threshold_free_evaluator():
+    from roofbench.evaluators.registry import make_evaluator
+
+    symbols = {symbol for row in rows_of(GLOSSARY) if len(row) == 4 for symbol in row[1].split(", ")}
+    assert {index.symbol for index in make_evaluator("threshold-free").indices} <= symbols
+
+
+def test_the_tasks_of_a_contributor_touch_files_that_are_there():
+    rows = rows_of(ROOT / "docs" / "reference" / "architecture.md")
+    tasks = [row for row in rows if len(row) == 3 and (row[0].startswith(("add", "change", "find")))]
+    assert len(tasks) == 7
+    modules = [path.as_posix() for room in ROOMS for path in (ROOT / room).rglob("*.py")]
+    for task, _, now in tasks:
+        names = re.findall(r"`([\w/]+\.py)`", now)
+        assert 1 <= len(names) <= 3, task
+        assert [name for name in names if not any(module.endswith(f"/{name}") for module in modules)] == [], task

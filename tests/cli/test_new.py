@@ -1,5 +1,6 @@
 """``roofbench new``: what it writes works as it is."""
 
+import os
 import re
 import subprocess
 import sys
@@ -25,7 +26,7 @@ def written(request, tmp_path):
 
 def test_its_own_tests_pass(written):
     _, folder = written
-    environment = {"PYTHONPATH": str(Path(rb.__file__).parents[1]), "PATH": "/usr/bin:/bin", "HOME": str(folder)}
+    environment = {**os.environ, "PYTHONPATH": str(Path(rb.__file__).parents[1])}
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stdout + done.stderr
