@@ -21,6 +21,7 @@ import re
 import sys
 import warnings
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -74,10 +75,23 @@ def kernel(function: Any = None, *, inline: str = "never") -> Any:
     """
     if function is None:
         return lambda function: kernel(function, inline=inline)
-    compiled: Any = numba.njit(function, nogil=True, inline=inline)
+    # Nobody takes the address of a kernel, so the wrapper for callers in C is not compiled.
+    compiled: Any = numba.njit(function, nogil=True, inline=inline, no_cfunc_wrapper=True)
     if isinstance(compiled, _Dispatcher):  # it is the function itself under NUMBA_DISABLE_JIT
         compiled._cache = _KernelCache(compiled, files=False)
+        compiled.get_call_template = partial(_call_without_literals, compiled)
     return compiled
+
+
+def _call_without_literals(compiled: Any, arguments: Any, named: Any) -> Any:
+    """Resolve a call from another kernel; numba would compile a kernel again for each constant that it is called with.
+
+    `numba.literally` and the like do not work in kernels therefore.
+    """
+    plain = tuple(_types.unliteral(kind) for kind in arguments)
+    return _Dispatcher.get_call_template(
+        compiled, plain, {name: _types.unliteral(kind) for name, kind in named.items()}
+    )
 
 
 def cache_folder() -> Path:

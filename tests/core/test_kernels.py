@@ -7,9 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba import config
 
 import roofbench
 from roofbench.core import kernel_files
+from roofbench.core.kernels import kernel
 
 ROOT = Path(roofbench.__file__).parent
 
@@ -230,3 +232,19 @@ def test_a_kernel_with_a_changed_constant_is_not_kept(tmp_path):
 
 def test_a_package_that_is_only_imported_does_not_load_numba(tmp_path):
     assert python("import sys, roofbench; print('numba' in sys.modules)", tmp_path, tmp_path)[0] == ["False"]
+
+
+@kernel
+def shifted(x, step):
+    return x + step
+
+
+@kernel
+def shifted_twice(x):
+    return shifted(x, 1) * shifted(x, step=2)
+
+
+def test_a_kernel_is_compiled_once_whatever_constants_it_is_called_with(tmp_path, monkeypatch):
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    assert shifted_twice(1.0) == 6.0
+    assert len(shifted.signatures) == 1
