@@ -1,6 +1,6 @@
-"""Conformance: what every detector and evaluator must keep to, checked on the built-in scene.
+"""Conformance: the rules of detectors and evaluators, checked on the built-in scene.
 
-``roofbench check-plugin NAME`` runs these checks on a plugin before it meets real scenes.
+``roofbench check-plugin NAME`` runs these checks on a plugin before it is used on real scenes.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _ELSEWHERE = "works in another process, with the same result"
 
 @dataclass(frozen=True)
 class Check:
-    """One rule and what came of it: `problem` is empty when it is kept."""
+    """A rule and its result: `problem` is empty where the rule is kept."""
 
     rule: str
     problem: str
@@ -50,7 +50,7 @@ def check_detector(detector: Detector) -> list[Check]:
     before = scene.content_hash
     elsewhere = _elsewhere(detector)
     if elsewhere.status == "failed" and not elsewhere.machine:
-        # It took its process with it: this one must not be next.
+        # Its process crashed, so it must not run in this one.
         return [*_declaration(detector), Check(_ELSEWHERE, elsewhere.reason)]
     return [
         *_declaration(detector),
@@ -99,8 +99,8 @@ def _declaration(plugin: Parameterised) -> Iterator[Check]:
     kind = type(plugin)
     frozen = getattr(getattr(kind, "__dataclass_params__", None), "frozen", False)
     yield Check("is a frozen dataclass", "" if frozen else "decorate it with @dataclass(frozen=True, kw_only=True)")
-    told = (kind.__doc__ or "").strip()
-    yield Check("has a docstring", "" if told and not told.startswith(kind.__name__ + "(") else "say what it does")
+    doc = (kind.__doc__ or "").strip()
+    yield Check("has a docstring", "" if doc and not doc.startswith(kind.__name__ + "(") else "describe what it does")
     silent = [name for name, rule in kind.parameters().items() if not rule.doc]
     yield Check("documents its parameters", f"no doc= for {', '.join(silent)}" if silent else "")
 
@@ -156,7 +156,7 @@ def _meadow(scene: Scene) -> Scene:
 
 
 def _elsewhere(detector: Detector) -> Outcome:
-    """Return what comes of the detector in a process of its own."""
+    """Return the outcome of the detector in a process of its own."""
     recipe = PluginRecipe.of(detector)
     task = Task(scene=SceneRecipe.of_preset("hamlet", seed=1), detector=recipe, seed=0, evaluators=())
     process = IsolatedProcess()

@@ -1,4 +1,4 @@
-"""Plans: which runs a suite means, which of them are stored already, and why the others have to be done."""
+"""Plans: the runs of a suite, which of them are stored, and why the others have to be executed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ __all__ = [
     "suite_from_content",
 ]
 
-#: ``missing``: what has no good result is run, failures again; ``never``: what is not stored at all; ``always``: all.
+#: Which runs are executed: ``missing``: those without a good result, failures included; ``never``: those that are not
+#: stored at all; ``always``: all.
 Rerun = Literal["missing", "never", "always"]
 
 
@@ -71,10 +72,10 @@ class PlannedRun:
     todo : {"detect", "evaluate", "nothing"}
         ``evaluate``: detections are stored, an evaluation is not.
     why : str
-        Reason in words.
+        Reason as a sentence.
     stored : int, optional
         Run id where a run of that key is stored.
-    lacking : tuple of KeyedEvaluator
+    missing : tuple of KeyedEvaluator
         Evaluators whose evaluation is not stored.
     """
 
@@ -84,7 +85,7 @@ class PlannedRun:
     todo: Literal["detect", "evaluate", "nothing"]
     why: str
     stored: int | None = None
-    lacking: tuple[KeyedEvaluator, ...] = ()
+    missing: tuple[KeyedEvaluator, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -102,12 +103,12 @@ class Plan:
         return [run.identity.key for run in self.runs]
 
     def counts(self) -> Mapping[str, int]:
-        """Return how many runs are to be detected, evaluated, or left alone."""
+        """Return how many runs are to be detected, evaluated, or kept as stored."""
         return Counter(run.todo for run in self.runs)
 
 
 def _recipe(plugin: Detector | Evaluator) -> PluginRecipe:
-    """Return the recipe, or for classes that only this process has, a name that tells them apart."""
+    """Return the recipe; for classes that exist in this process only, one whose name says so."""
     try:
         return PluginRecipe.of(plugin)
     except UnsupportedError:
@@ -128,7 +129,7 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
     store : Store
     rerun : {"missing", "never", "always"}
     only_failed : bool
-        Try failures again and leave everything else alone.
+        Repeat failed runs and leave all others as they are.
     """
     evaluators = tuple(KeyedEvaluator.of(evaluator) for evaluator in suite.evaluators)
     identities: list[tuple[RunIdentity, DetectorEntry, SceneRecipe | Scene]] = []
@@ -158,7 +159,7 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
     runs = []
     for key, (identity, entry, scene) in unique.items():
         run_id, status, reason = stored.get(key, (None, None, ""))
-        lacking: tuple[KeyedEvaluator, ...] = ()
+        missing: tuple[KeyedEvaluator, ...] = ()
         todo: Literal["detect", "evaluate", "nothing"] = "nothing"
         if status is None:
             todo, why = "detect", _why_new(store, identity)
@@ -172,20 +173,20 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
             why = f"skipped: {reason}"
         else:
             why = f"stored as run {run_id}"
-            lacking = tuple(keyed for keyed in evaluators if run_id not in evaluated[keyed.key])
-            if lacking:
+            missing = tuple(keyed for keyed in evaluators if run_id not in evaluated[keyed.key])
+            if missing:
                 todo = "evaluate"
-                why += ", not yet evaluated by " + ", ".join(keyed.label for keyed in lacking)
+                why += ", not yet evaluated by " + ", ".join(keyed.label for keyed in missing)
         if only_failed and status != "failed":
             todo = "nothing"
         runs.append(
-            PlannedRun(identity=identity, entry=entry, scene=scene, todo=todo, why=why, stored=run_id, lacking=lacking)
+            PlannedRun(identity=identity, entry=entry, scene=scene, todo=todo, why=why, stored=run_id, missing=missing)
         )
     return Plan(suite, tuple(runs), evaluators, rerun)
 
 
 def _why_new(store: Store, identity: RunIdentity) -> str:
-    """Say what differs from the latest stored run of the same detector, scene and seed, when there is one."""
+    """Return what differs from the latest stored run of the same detector, scene and seed, if there is one."""
     latest = store.latest_like(identity.label, identity.scene.name, identity.seed)
     return (
         "not run yet"
@@ -195,7 +196,7 @@ def _why_new(store: Store, identity: RunIdentity) -> str:
 
 
 def differences(store: Store, run_id: int, identity: RunIdentity) -> list[str]:
-    """Return in words which parts of a stored run's key differ from those of `identity`; empty when none does."""
+    """Return one sentence for each part of a stored run's key that differs from `identity`."""
     row, code = store.run(run_id), store.code(run_id)
     found = []
     now = dict(identity.detector.parameters)
@@ -209,11 +210,11 @@ def differences(store: Store, run_id: int, identity: RunIdentity) -> list[str]:
     ):
         for name in sorted({*before, *after}):
             if before.get(name) != after.get(name):
-                change = "changed" if name in before and name in after else "new" if name in after else "gone"
-                told = (
+                change = "changed" if name in before and name in after else "added" if name in after else "removed"
+                versions = (
                     f" ({before.get(name)} to {after.get(name)})" if kind == "package" and change == "changed" else ""
                 )
-                found.append(f"{kind} {name} {change}{told}")
+                found.append(f"{kind} {name} {change}{versions}")
     if row.fingerprint != identity.fingerprint:
         found.append("the program or file that it reads changed")
     if row.scene_key != identity.scene_key:
@@ -224,7 +225,7 @@ def differences(store: Store, run_id: int, identity: RunIdentity) -> list[str]:
 
 
 def identity_now(row: RunRow) -> RunIdentity:
-    """Return what the identity of a stored run would be today."""
+    """Return the identity that a stored run would have with the present code."""
     recipe = PluginRecipe(row.detector, row.parameters)
     detector = recipe.detector()
     return RunIdentity(
@@ -239,7 +240,7 @@ def identity_now(row: RunRow) -> RunIdentity:
 
 
 def plan_content(suite: Suite) -> dict[str, Any]:
-    """Return a suite as JSON holds it, to be resumed from the store."""
+    """Return a suite as JSON content, so that it can be resumed from the store."""
     return {
         "name": suite.name,
         "scenes": [scene_recipe(scene).to_dict() for scene in suite.scenes],
@@ -251,7 +252,7 @@ def plan_content(suite: Suite) -> dict[str, Any]:
 
 
 def suite_from_content(content: Mapping[str, Any]) -> Suite:
-    """Return the suite that `plan_content` wrote down."""
+    """Return the suite of what `plan_content` returned."""
     detectors: Sequence[DetectorEntry] = [
         DetectorEntry(
             PluginRecipe(item["use"], item["parameters"], item.get("execution", {})).detector(), tuple(item["seeds"])

@@ -1,4 +1,4 @@
-"""Suites: what is run, as a TOML file, as words on the command line, or as Python objects.
+"""Suites: scenes, detectors and evaluators, from a TOML file, the command line, or Python objects.
 
 Nouns
 -----
@@ -6,7 +6,7 @@ suite
     Named scenes, detectors and evaluators; every detector runs on every scene.
 scene entry
     A folder (``path``), or a preset of the generator with ``seeds`` and parameters, of which a list is a sweep axis.
-entry
+detector entry
     A detector with parameters and the seeds of its random streams.
 """
 
@@ -47,14 +47,14 @@ _MAX_AXIS = 10_000
 
 @dataclass(frozen=True)
 class DetectorEntry:
-    """A detector and the seeds it runs with on every scene."""
+    """A detector and the seeds with which it runs on every scene."""
 
     detector: Detector
     seeds: tuple[int, ...] = (0,)
 
     def __post_init__(self) -> None:
         if not self.detector.stochastic and self.seeds != (0,):
-            object.__setattr__(self, "seeds", (0,))  # other seeds would repeat the same footprints
+            object.__setattr__(self, "seeds", (0,))  # other seeds would give the same footprints
 
     @property
     def label(self) -> str:
@@ -64,13 +64,13 @@ class DetectorEntry:
 
 @dataclass(frozen=True)
 class Suite:
-    """What is run.
+    """Scenes, detectors and evaluators.
 
     Attributes
     ----------
     name : str
     scenes : tuple of SceneRecipe or Scene
-        Scene objects stay in this process or are spooled for workers.
+        Scene objects stay in this process, or are written to files for workers.
     detectors : tuple of DetectorEntry
     evaluators : tuple of Evaluator
     """
@@ -91,7 +91,7 @@ class Suite:
         return replace(self, scenes=kept)
 
     def with_seeds(self, count: int) -> Suite:
-        """Return the suite with seeds 1 to `count` of every preset instead of those it names."""
+        """Return the suite with seeds 1 to `count` of every preset instead of its own seeds."""
         scenes: dict[str, SceneRecipe | Scene] = {}
         for scene in self.scenes:
             if isinstance(scene, Scene) or scene.kind not in ("preset", "builtin"):
@@ -206,13 +206,13 @@ def suite_of_scenes(scenes: Iterable[SceneRecipe | Scene], *, name: str = "scene
 
 
 def all_detectors() -> tuple[DetectorEntry, ...]:
-    """Return every registered detector that needs no parameter of its own to run, with default parameters."""
+    """Return every registered detector that runs with default parameters."""
     detectors = []
     for name in DETECTORS.names():
         try:
             detectors.append(DetectorEntry(make_detector(name)))
         except (ParameterError, ModuleNotFoundError):
-            continue  # one that wraps a program or a file, or is not installed in full, is run when it is asked for
+            continue  # needs a program, a file or an extra package, and is run on request only
     return tuple(detectors)
 
 
@@ -230,14 +230,14 @@ def _some(names: Sequence[str], most: int = 8) -> str:
 
 
 class _Places:
-    """Where the tables and keys of a TOML text stand, for messages."""
+    """Line numbers of the tables and keys of a TOML text, for messages."""
 
     def __init__(self, text: str, source: str) -> None:
         self._lines = text.splitlines()
         self._source = source
 
     def error(self, message: str, table: str | None = None, number: int = 0, key: str | None = None) -> InputError:
-        """Return the error with file, line and table named."""
+        """Return an error that names file, line and table."""
         line = self._line(table, number, key)
         place = f"{self._source}, line {line}" if line else self._source
         where = f" in [[{table}]] number {number + 1}" if table else ""
@@ -300,7 +300,7 @@ def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number
     if "path" in entry:
         for key in entry:
             if key != "path":
-                raise places.error(f"{key!r} is nothing that a scene with a path takes", "scenes", number, key)
+                raise places.error(f"{key!r} is not allowed for a scene with a path", "scenes", number, key)
         try:
             yield SceneRecipe.of_folder(folder / str(entry["path"]))
         except RoofbenchError as error:

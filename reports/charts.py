@@ -55,7 +55,7 @@ def size_figure(curves: Sequence[SizeCurve]) -> Figure:
 
 def _draw_size(axes: Axes, bins: Sequence[SizeBin], label: str, place: int, count: int) -> None:
     colour, marker = SERIES[place % len(SERIES)]
-    # Points of one bin stand side by side, so that their bars can be told apart.
+    # Points of one bin are drawn side by side, so that their bars do not cover each other.
     offset = (place - (count - 1) / 2) * min(0.12, 0.6 / max(count, 1))
     shown = [(number + offset, each) for number, each in enumerate(bins) if each.count]
     x = [position for position, _ in shown]
@@ -94,12 +94,12 @@ def cost_figure(costs: Sequence[CostPoint]) -> Figure:
         style_axes(axes)
         axes.set_title(title, loc="left", fontsize=10)
         for place, label in enumerate(labels):
-            mine = [cost for cost in costs if cost.label == label and value(cost) > 0]
+            own = [cost for cost in costs if cost.label == label and value(cost) > 0]
             colour, marker = SERIES[place % len(SERIES)]
-            x = [(cost.points or 0) / 1000 if by_points else cost.hectares for cost in mine]
+            x = [(cost.points or 0) / 1000 if by_points else cost.hectares for cost in own]
             axes.plot(
                 x,
-                [value(cost) for cost in mine],
+                [value(cost) for cost in own],
                 linestyle="none",
                 marker=marker,
                 color=colour,

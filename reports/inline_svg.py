@@ -19,7 +19,7 @@ __all__ = ["FAINT", "INK", "SERIES", "new_figure", "style_axes", "to_inline_svg"
 
 #: Stand-ins that no picture contains by chance.
 INK, FAINT = "#123457", "#cbd5e3"
-#: Colours of lines and markers (Okabe & Ito), each with its own marker: told apart without colour, too.
+#: Colours of lines and markers (Okabe & Ito), each with its own marker, so that they differ without colour, too.
 SERIES: tuple[tuple[str, str], ...] = (
     ("#0072B2", "o"),
     ("#D55E00", "s"),

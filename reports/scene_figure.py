@@ -69,7 +69,7 @@ def overlay_figure(view: SceneView, *, window: tuple[float, float, float, float]
 
 
 def _pale(picture: ScenePicture) -> NDArray[np.float64]:
-    """Return the picture half way to white, so that colours over it are told apart."""
+    """Return the picture in pale colours, so that the verdicts stand out."""
     with Bitmap.open(io.BytesIO(picture.content)) as bitmap:
         pixels = np.asarray(bitmap.convert("RGB"), dtype=np.float64) / 255
     grey = pixels.mean(axis=-1, keepdims=True)

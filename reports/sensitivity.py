@@ -51,15 +51,15 @@ def sensitivity_figure(lines: Sequence[Sensitivity], *, level: float | None = No
         panel.set_visible(False)
     for panel, name in zip(grid.flat, axes_names, strict=False):
         style_axes(panel)
-        mine = [line for line in lines if line.axis == name]
-        values, places = _places(mine)
-        for line in mine:
+        own = [line for line in lines if line.axis == name]
+        values, places = _places(own)
+        for line in own:
             colour, marker = SERIES[detectors.index(line.detector) % len(SERIES)]
             dash = _DASHES[[index.key for index in indices].index(line.index.key) % len(_DASHES)]
             _draw_line(panel, line, places, colour=colour, marker=marker, dash=dash, factor=factor)
         if level is not None and percent:
             panel.axhline(100 * level, color=INK, linewidth=0.8, linestyle=":", alpha=0.7)
-        _label_axis(panel, name, mine, values, places)
+        _label_axis(panel, name, own, values, places)
     units = " / ".join(dict.fromkeys(index.symbol or index.title for index in indices))
     for row in grid:
         row[0].set_ylabel(f"{units} [{'%' if percent else indices[0].unit}], mean over scenes")

@@ -1,8 +1,8 @@
-"""Baselines: what a version of the code reached on every scene, as a small JSON file that lives in git.
+"""Baselines: reference scores of a version of the code, as a small JSON file that is kept in git.
 
-It holds no detections, only index values by detector, scene and seed, with the content hash of each scene and the
-recipes that repeat them. Values are rounded to nine decimals, on both sides of a comparison, and one line per scene and
-seed makes a change readable in a diff.
+A baseline contains index values by detector, scene and seed, the content hash of each scene, and the recipes that
+repeat the runs; it contains no detections. Values are rounded to nine decimals on both sides of a comparison. There is
+one line per scene and seed, so that changes are readable in a diff.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _DECIMALS = 9
 
 @dataclass(frozen=True)
 class BaselineScene:
-    """A scene of a baseline: how it is opened, and what it held."""
+    """A scene of a baseline: its recipe and the hash of its content."""
 
     recipe: SceneRecipe
     content_hash: str
@@ -41,7 +41,7 @@ class BaselineScene:
 
 @dataclass(frozen=True)
 class Measured:
-    """What one detector reached: status and values of every run by scene and seed.
+    """Scores of one detector: the values of every run by scene and seed.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Measured:
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
-    """What a version of the code reached.
+    """Reference scores of a version of the code.
 
     Attributes
     ----------
@@ -86,10 +86,10 @@ class Baseline:
         return Suite(self.suite, scenes, detectors, (self.evaluator.evaluator(),))
 
     def counterparts(self, labels: Sequence[str]) -> dict[str, str]:
-        """Return for each of these detectors the label of the one here that it is compared with.
+        """Return for each of these detectors the label of the detector of this baseline that it is compared with.
 
-        That of the same label, else the only one of that name: ``ndsm[height=2]`` is compared with ``ndsm``. One
-        detector alone is compared with the one that is alone here, whatever they are called. A detector that has no
+        It is the one of the same label, else the only one of the same name: ``ndsm[height=2]`` is compared with
+        ``ndsm``. If there is one detector on each side, they are compared whatever their names. A detector without a
         counterpart is left out.
 
         Raises
@@ -110,12 +110,12 @@ class Baseline:
         return found
 
     def with_labels_of(self, other: Baseline) -> Baseline:
-        """Return this one with detectors named as their counterparts in `other`."""
+        """Return the baseline with detectors named as their counterparts in `other`."""
         named = other.counterparts(list(self.detectors))
         return replace(self, detectors={named.get(label, label): found for label, found in self.detectors.items()})
 
     def only(self, labels: Iterable[str]) -> Baseline:
-        """Return this one with these detectors only, or raise `UnknownNameError`."""
+        """Return the baseline with these detectors only, or raise `UnknownNameError`."""
         for label in (labels := list(labels)):
             if label not in self.detectors:
                 raise UnknownNameError(
@@ -125,7 +125,7 @@ class Baseline:
         return replace(self, detectors={label: self.detectors[label] for label in labels})
 
     def with_scenes(self, pattern: str) -> Baseline:
-        """Return this one with only the scenes whose name matches a pattern such as ``knox*``."""
+        """Return the baseline with only the scenes whose name matches a pattern such as ``knox*``."""
         kept = {scene.name for scene in self.to_suite().with_scenes(pattern).scenes}
         return replace(
             self,
@@ -156,8 +156,8 @@ class Baseline:
                 f"        {json.dumps([scene, seed, None if values is None else dict(values)])}"
                 for (scene, seed), values in sorted(measured.runs.items())
             ]
-            told = {**measured.recipe.to_dict(), "seeds": list(measured.seeds)}
-            body = [f"      {json.dumps(name)}: {json.dumps(value)}," for name, value in told.items()]
+            facts = {**measured.recipe.to_dict(), "seeds": list(measured.seeds)}
+            body = [f"      {json.dumps(name)}: {json.dumps(value)}," for name, value in facts.items()]
             listed = ",\n".join(runs)
             text = "\n".join([*body, f'      "runs": [\n{listed}\n      ]'])
             detectors.append(f"    {json.dumps(label)}: {{\n{text}\n    }}")
@@ -165,18 +165,18 @@ class Baseline:
         return "{\n" + "\n".join(parts) + "\n}\n"
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the file, whole or not at all."""
+        """Write the file; it appears complete or not at all."""
         with whole_file(path, overwrite=overwrite) as scratch:
             scratch.write_text(self.to_json(), encoding="utf-8")
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a file that `save` wrote.
+        """Return the baseline of a file that `save` wrote.
 
         Raises
         ------
         InputError
-            Missing file, or one that is no baseline of a known format.
+            Missing file, or a file that is no baseline of a known format.
         """
         file = Path(path)
         if not file.is_file():
@@ -220,7 +220,7 @@ class Baseline:
 def measure(
     suite: Suite, rows: Sequence[RunRow], store: Store, keyed: KeyedEvaluator, version: CodeVersion
 ) -> Baseline:
-    """Return what stored runs of a suite reached."""
+    """Return the baseline of stored runs of a suite."""
     values = store.index_values([row.id for row in rows if row.status == "ok"], keyed.key)
     scenes: dict[str, BaselineScene] = {}
     for row in rows:
@@ -253,7 +253,7 @@ def _rounded(values: Mapping[str, float | None], evaluator: Evaluator) -> dict[s
 
 
 def _portable(recipe: SceneRecipe) -> SceneRecipe:
-    """Return the recipe with a folder below the working directory as a relative path, for other machines."""
+    """Return the recipe with a relative path for a folder below the working directory, for other machines."""
     place = Path(recipe.place)
     if recipe.kind == "folder" and place.is_relative_to(Path.cwd()):
         return replace(recipe, place=str(place.relative_to(Path.cwd())))

@@ -39,21 +39,21 @@ def compare_stores(
         No evaluator has evaluated runs of both stores.
     """
     rows = [newest_runs(store, detector=detector, scene=scene) for store in (first, second)]
-    evaluators = [stored_evaluators(store, mine) for store, mine in zip((first, second), rows, strict=True)]
-    labels = [{keyed.label: keyed for keyed in mine} for mine in evaluators]
+    evaluators = [stored_evaluators(store, own) for store, own in zip((first, second), rows, strict=True)]
+    labels = [{keyed.label: keyed for keyed in own} for own in evaluators]
     common = next((label for label in labels[0] if label in labels[1]), None)
     if common is None:
         raise InputError(
             f"{first.path} and {second.path} have no evaluator in common: evaluate one of them with 'roofbench score'"
         )
     one, two = (
-        _cells(store, mine, known[common]) for store, mine, known in zip((first, second), rows, labels, strict=True)
+        _cells(store, own, known[common]) for store, own, known in zip((first, second), rows, labels, strict=True)
     )
     evaluator = labels[0][common].evaluator
     shared = sorted(one.keys() & two.keys())
     found = []
     for label in dict.fromkeys(label for label, _ in shared):
-        scenes = [place for mine, place in shared if mine == label]
+        scenes = [place for found_label, place in shared if found_label == label]
         for index in evaluator.indices:
             row = (
                 _compared(label, index, [(one[label, place], two[label, place]) for place in scenes])
@@ -63,8 +63,8 @@ def compare_stores(
             if row is not None:
                 found.append(row)
     notes = []
-    for name, mine, other in (("A", one, two), ("B", two, one)):
-        alone = mine.keys() - other.keys()
+    for name, cells, other in (("A", one, two), ("B", two, one)):
+        alone = cells.keys() - other.keys()
         if alone:
             notes.append(f"only in {name}: {len(alone)} pairs of detector and scene, not compared")
     return StoreComparison(

@@ -1,25 +1,25 @@
-"""The gate: whether a change of the code has made a detector worse.
+"""The gate: whether a change of the code makes a detector worse.
 
-Candidate and baseline are paired by scene; a stochastic detector counts by its mean over seeds of each scene. Per
-index, with differences signed so that positive is better and a margin that is taken as no difference:
+Candidate and baseline are paired by scene; of a stochastic detector the mean over seeds counts on each scene. There is
+one conclusion per index. Differences are signed so that positive is better; up to a margin they count as no difference:
 
 worse
-    the test of (difference + margin) says that its mean is below zero;
+    by the test of (difference + margin), its mean is below zero;
 better
-    the test of (difference - margin) says that it is above;
+    by the test of (difference - margin), its mean is above zero;
 equal
     the 95 % bootstrap interval of the mean difference lies within the margin;
 not measurable
-    with so few scenes that no test can reach the level after Holm's correction: the two-sided p of n paired
+    there are too few scenes for any test to reach the level after Holm's correction: the two-sided p of n paired
     differences cannot fall below ``2 ** (1 - n)``;
 undecided
-    anything else: the data allow a difference beyond the margin as well as none.
+    anything else: the data are consistent with no difference and with one beyond the margin.
 
-Why an identical detector passes: with as many seeds on both sides, baseline and candidate could be exchanged, so the
-difference of each scene is symmetric about zero, however it scatters. The sign-flip test is exact for that, and the
-margin, which is added to every difference, can only raise its p. Holm's correction is over the indices of a detector,
-for one-sided tests in one direction: it holds however the indices hang together. So `worse` is said of an identical
-detector, on whichever index, in at most half of the level of all gate runs, and of a deterministic one never.
+Why an identical detector passes: with equally many seeds on both sides, baseline and candidate are exchangeable, so
+the difference of each scene is symmetric about zero, whatever its variance. The sign-flip test is exact for that, and
+the margin, which is added to every difference, can only raise its p. Holm's correction is over the indices of a
+detector, for one-sided tests in one direction; it holds for any dependence between the indices. Hence an identical
+detector is called `worse` on any index in at most half of the level of all gate runs, a deterministic one never.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from .results import Conclusion, GateResult, IndexConclusion
 
 __all__ = ["GATE_LEVEL", "compare", "different_scenes", "margins_of", "seeds_share"]
 
-#: Of 200 gate runs of an identical detector at most one says `worse`.
+#: At most one of 200 gate runs of an identical detector concludes `worse`.
 GATE_LEVEL = 0.01
-#: Margins by unit: half a percent point, one percent of a ratio, two centimetres, a tenth of a pixel.
+#: Margins by unit: half a percentage point, 0.01 of a ratio, two centimetres, a tenth of a pixel.
 DEFAULT_MARGINS = {"fraction": 0.005, "ratio": 0.01, "m": 0.02, "px": 0.1, "count": 0.0}
 
 
@@ -63,7 +63,7 @@ def margins_of(texts: Sequence[str], indices: Sequence[Index]) -> dict[str, floa
 
 
 def different_scenes(baseline: Baseline, candidate: Baseline) -> list[str]:
-    """Return in words how the scenes of two measurements differ; empty when they are the same."""
+    """Return one sentence for each difference between the scenes or evaluators of two baselines."""
     found = []
     for name in sorted({*baseline.scenes, *candidate.scenes}):
         one, two = baseline.scenes.get(name), candidate.scenes.get(name)
@@ -87,7 +87,7 @@ def compare(
     level: float = GATE_LEVEL,
     extra: Sequence[IndexConclusion] = (),
 ) -> GateResult:
-    """Return the conclusions of every detector that both have; the scenes must be the same."""
+    """Return the conclusions on every detector of both sides; the scenes must be the same."""
     conclusions: list[IndexConclusion] = []
     failures: list[str] = []
     for label, before in baseline.detectors.items():
@@ -117,7 +117,7 @@ def compare_detector(
     margins: Mapping[str, float],
     level: float = GATE_LEVEL,
 ) -> list[IndexConclusion]:
-    """Return the conclusion of every index of one detector."""
+    """Return the conclusion on every index of one detector."""
     pairs = [_pairs(before, after, index) for index in indices]
     differences = [
         [new - old if index.better == "higher" else old - new for old, new in found.values()]
@@ -170,7 +170,7 @@ def compare_detector(
 def _adjusted(differences: Sequence[Sequence[float]]) -> list[float]:
     """Return Holm-adjusted two-sided p of differences below zero: twice the one-sided ones.
 
-    Corrected one-sided: a difference that is surely above zero must not lower the bar for the others.
+    The correction is one-sided: a certain improvement of one index must not lower the bar for the others.
     """
     return [min(1.0, 2 * p) for p in holm([sign_flip_p(found) for found in differences])]
 
@@ -195,10 +195,10 @@ def _pairs(before: Measured, after: Measured, index: Index) -> dict[str, tuple[f
 
 
 def seeds_share(before: Measured, after: Measured, index: Index) -> float | None:
-    """Return which share of the variance of the mean difference comes from seeds; None where nothing tells.
+    """Return the share of the variance of the mean difference that comes from seeds; None where it cannot be estimated.
 
     Each scene's difference of two means carries the variance over seeds divided by their number, on both sides; the
-    rest of the variance over scenes is how differently the change works on them.
+    rest of the variance over scenes is the different effect of the change on them.
     """
     old, new = _values(before, index), _values(after, index)
     both = old.keys() & new.keys()

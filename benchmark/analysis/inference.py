@@ -1,4 +1,4 @@
-"""Inference over scenes: intervals, paired tests, Holm's correction, and groups that cannot be told apart.
+"""Inference over scenes: intervals, paired tests, Holm's correction, and groups without significant differences.
 
 The unit is the scene: one number per scene and detector (the mean over seeds of a stochastic one). Everything is
 deterministic: resampling draws from a fixed stream, so the same numbers give the same interval.
@@ -55,7 +55,7 @@ def expanded_level(count: int, level: float = LEVEL) -> float:
 
     Plain percentiles are too narrow for few values; for many, this tends to ``level / 2``.
     """
-    from scipy import special  # the whole of scipy.stats takes a second to import
+    from scipy import special  # importing scipy.stats takes a second
 
     return float(special.ndtr(-math.sqrt(count / (count - 1)) * special.stdtrit(count - 1, 1 - level / 2)))
 
@@ -85,11 +85,11 @@ def sign_flip_p(differences: ArrayLike) -> float:
     """Return the one-sided p of paired differences against the alternative that their centre lies below zero.
 
     The exact sign-flip permutation test of the mean: the share of all sign patterns whose sum is as low as the one
-    found. It asks for nothing but differences that are symmetric under the null hypothesis, and for no difference at
-    all it gives 1. Adding a constant to all differences never lowers it.
+    found. It only assumes that differences are symmetric under the null hypothesis. If all differences are 0, it is 1.
+    Adding a constant to all differences never lowers it.
 
-    Up to 16 differences every pattern is enumerated; beyond, differences are rounded to 1/4096 of the largest, and the
-    distribution of their sum is added up on that lattice, which is exact again: rounding keeps what is symmetric.
+    Up to 16 differences every pattern is enumerated. With more, differences are rounded to 1/4096 of the largest, and
+    the distribution of their sum is computed on that lattice. This is exact again, because rounding keeps symmetry.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def sign_flip_p(differences: ArrayLike) -> float:
         return 1.0
     if len(numbers) > _MOST_ENUMERATED:
         return _lattice_p(np.rint(numbers / scale * _LATTICE).astype(np.int64))
-    numbers = np.round(numbers / scale, 12)  # ties among sums must not hang on the last bit
+    numbers = np.round(numbers / scale, 12)  # ties among sums must not depend on the last bit
     sums = np.zeros(1)
     for number in numbers:
         sums = np.concatenate([sums + number, sums - number])

@@ -1,4 +1,4 @@
-"""The leaderboard: stored evaluations of a plan, pooled and averaged over scenes, ranked, failures shown."""
+"""The leaderboard: stored evaluations, pooled and averaged over scenes, ranked, with failures listed."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def make_leaderboard(
     Notes
     -----
     The unit is the scene: the value of a detector with several seeds on a scene is the mean over its seeds. Pooled
-    values add the tallies of all runs. A detector without a result on some scene has no rank: its figures are over
-    other scenes than those of the rest.
+    values add the tallies of all runs. A detector without a result on some scene has no rank, because its values are
+    over other scenes than those of the other detectors.
     """
     evaluations = store.evaluations([row.id for row in rows if row.status == "ok"], keyed.evaluator, keyed.key)
     counts = store.reference_counts()
@@ -95,7 +95,7 @@ def make_leaderboard(
 
 
 class _Tally:
-    """The runs of one detector, gathered by scene."""
+    """The runs of one detector, grouped by scene."""
 
     def __init__(
         self,
@@ -115,7 +115,7 @@ class _Tally:
 
     @property
     def scenes(self) -> int:
-        """Scenes all of whose runs have a result."""
+        """Number of scenes on which all runs have a result."""
         return len({row.scene for row in self._evaluated} - {row.scene for row in self.rows if row.status != "ok"})
 
     def pooled(self, index: Index) -> Cell:
@@ -127,7 +127,7 @@ class _Tally:
 
     @cached_property
     def _pooled_intervals(self) -> dict[str, tuple[float, float]]:
-        """Return the interval of every pooled index: scenes are resampled and their tallies added anew."""
+        """Return the interval of every pooled index: scenes are resampled and their tallies added."""
         scenes: dict[str, Tallies] = {}
         for row, evaluation in zip(self._evaluated, self._evaluations, strict=True):
             known = scenes.get(row.scene)
@@ -193,7 +193,7 @@ class _Tally:
 
 
 def _groups(boards: Sequence[_Tally], index: Index) -> tuple[dict[str, str], list[str]]:
-    """Return letters shared by detectors that cannot be told apart, and what was tested in words."""
+    """Return letters shared by detectors whose difference is not significant, and a note on the tests."""
     if len(boards) < 2:
         return {}, []
     values = [board.scene_values(index) for board in boards]
@@ -202,24 +202,24 @@ def _groups(boards: Sequence[_Tally], index: Index) -> tuple[dict[str, str], lis
     fewest, needed = min(map(len, common.values())), scenes_needed(len(pairs))
     if fewest < needed:
         return {}, [
-            f"groups are not told apart: {len(pairs)} paired tests need {needed} scenes where {index.title} is "
-            f"defined, there are {fewest}"
+            f"too few scenes for significance tests by {index.title}: {len(pairs)} paired tests need {needed}, "
+            f"{fewest} available"
         ]
     p_values = [paired_p([values[i][scene] - values[j][scene] for scene in common[i, j]]) for i, j in pairs]
     differing = {pair for pair, p in zip(pairs, holm(p_values), strict=True) if p <= LEVEL}
     letters = letter_groups(len(boards), lambda i, j: (i, j) in differing)
     note = (
-        f"detectors that share a letter cannot be told apart by {index.title} on these scenes (paired tests over "
-        f"{fewest} scenes, Holm, level {LEVEL:g})"
+        f"detectors that share a letter do not differ significantly in {index.title} (paired tests over {fewest} "
+        f"scenes, Holm, level {LEVEL:g})"
     )
     return {board.label: letter for board, letter in zip(boards, letters, strict=True)}, [note]
 
 
 def _described(evaluator: Evaluator) -> str:
-    """Return the evaluator with what decides its figures, defaults included."""
-    told = [f"{name} {value}" for name, value in evaluator.values().items() if isinstance(value, str)]
-    told += [f"{name} {value}" for name, value in evaluator.changed().items() if not isinstance(value, str)]
-    return f"{evaluator.name} ({', '.join(told)})" if told else evaluator.name
+    """Return the evaluator with the parameters that decide its values, defaults included."""
+    words = [f"{name} {value}" for name, value in evaluator.values().items() if isinstance(value, str)]
+    words += [f"{name} {value}" for name, value in evaluator.changed().items() if not isinstance(value, str)]
+    return f"{evaluator.name} ({', '.join(words)})" if words else evaluator.name
 
 
 def _notes(boards: Sequence[_Tally], scenes: Sequence[str]) -> tuple[str, ...]:
@@ -246,7 +246,7 @@ def unsuccessful_runs(rows: Iterable[RunRow]) -> tuple[UnsuccessfulRun, ...]:
 
 
 def repeat_command(row: RunRow) -> str:
-    """Return the command that repeats a run alone, in full view."""
+    """Return the command that repeats one run in the foreground."""
     _, bracket, changed = row.label.partition("[")
     detector = row.detector + bracket + changed
     words = ["roofbench", "detect", detector, row.recipe.word, "--seed", str(row.seed), "-o", "out.gpkg"]

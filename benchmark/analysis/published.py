@@ -1,7 +1,7 @@
-"""What the papers report, beside what we measure, and whether the printed tables agree with their own definitions.
+"""Published tables, and whether they agree with their own definitions.
 
-The figures are *published*: they are of other data (real scenes that are not public in full), so a comparison and not
-a test. Values are kept as printed, in percent, because the number of printed decimals decides what a check can tell.
+The published values are of other data (real scenes that are not completely public); they allow a comparison, not a
+test. Values are kept as printed, in percent, because the number of printed decimals limits what can be checked.
 
 Sources
 -------
@@ -33,9 +33,9 @@ class PublishedRow:
     Attributes
     ----------
     detector : str
-        Our name of the detector.
+        Name of the detector in roofbench.
     scene : str
-        As the paper calls it.
+        Name in the paper.
     presets : tuple of str
         Presets of the generator that follow its description.
     source : str
@@ -132,7 +132,7 @@ PUBLISHED: tuple[PublishedRow, ...] = (
 
 @dataclass(frozen=True, kw_only=True)
 class OursRow:
-    """What we measured on the presets of a published row: means of the scenes' values by index key."""
+    """Our values on the presets of a published row: means over scenes by index key."""
 
     scenes: int
     values: Mapping[str, float | None]
@@ -140,14 +140,14 @@ class OursRow:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Published rows, each with ours where the detector ran on a preset of that description."""
+    """Published rows, each with our row where the detector ran on presets that follow its description."""
 
     rows: tuple[tuple[PublishedRow, OursRow | None], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """Whether a printed table obeys one rule.
+    """Result of one rule on a printed table.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class Check:
     tested : int
         Rows or columns that could be tested.
     failed : tuple of str
-        Where it fails, with what would be expected.
+        Where the rule fails, with the expected value.
     """
 
     source: str
@@ -191,8 +191,8 @@ _COUNTS_2013 = {
 def checks(rows: Iterable[PublishedRow] = PUBLISHED) -> tuple[Check, ...]:
     """Return what can be tested of printed tables: identities of the definitions, averages, and counts behind them.
 
-    A printed number stands for an interval of half its last digit on either side; a rule fails where the intervals do
-    not meet.
+    A printed number represents an interval of half its last digit on either side; a rule fails where the intervals are
+    disjoint.
     """
     tables: dict[str, list[PublishedRow]] = {}
     for row in rows:
@@ -215,8 +215,8 @@ def checks(rows: Iterable[PublishedRow] = PUBLISHED) -> tuple[Check, ...]:
 
 
 def _interval(text: str) -> tuple[float, float] | None:
-    """Return the fractions that a printed percentage (or length) stands for; None for text such as ``> 85``."""
-    text = text.removesuffix(" m")  # only compared with its like, so that metres may stand for a hundredth
+    """Return the interval of fractions that a printed percentage (or length) represents; None for ``> 85``."""
+    text = text.removesuffix(" m")  # only compared with lengths, so the division by 100 does not matter
     try:
         value = float(text)
     except ValueError:
@@ -241,7 +241,7 @@ def _identity(
         if printed is None or len(known) < len(parts):
             continue
         tested += 1
-        # The formulas are monotonic in each argument, so the corners bound them.
+        # The formulas are monotonic in each argument, so that the corners are the extremes.
         corners = [formula(*corner) for corner in itertools.product(*known)]
         if max(corners) < printed[0] or min(corners) > printed[1]:
             expected = 50 * (min(corners) + max(corners))

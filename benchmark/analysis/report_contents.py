@@ -1,7 +1,7 @@
-"""Filling a report from the results store.
+"""The contents of a report, from the results store.
 
-The runs of a report are the newest of each detector, scene and seed. Tables are over all of them; maps, gallery and
-sizes are drawn of a sample where there are many, and the report says so.
+The runs of a report are the newest of each detector, scene and seed. Tables are over all of them. Where there are many,
+maps, gallery and sizes are of a sample, and the report says so.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Values = Mapping[int, Mapping[str, float | None]]
 
 
 def newest_runs(store: Store, *, detector: str | None = None, scene: str | None = None) -> list[RunRow]:
-    """Return the newest run of each detector label, scene and seed, in the order in which they were first stored.
+    """Return the newest run of each detector label, scene and seed, in the order of their ids.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ def newest_runs(store: Store, *, detector: str | None = None, scene: str | None 
 
 
 def stored_evaluators(store: Store, rows: Sequence[RunRow]) -> list[KeyedEvaluator]:
-    """Return the evaluators that evaluated these runs, the one that evaluated most of them first.
+    """Return the evaluators of these runs, the one with most evaluations first.
 
-    Of evaluators that differ in their code only, the one that evaluated most; one whose plugin is not here is left out.
+    Of evaluators that differ in their code only, the one with most evaluations; those of missing plugins are left out.
     """
     good = [row.id for row in rows if row.status == "ok"]
     found: dict[str, tuple[int, KeyedEvaluator]] = {}
@@ -87,14 +87,14 @@ def fill_report(
         Of every status; see `newest_runs`.
     title : str
     evaluated : sequence of (KeyedEvaluator, Leaderboard), optional
-        Evaluators with their leaderboards, where they are made already.
+        Evaluators with their leaderboards, where the caller has them.
     rank_by : str, optional
         Index key.
     gate : GateResult, optional
     sensitivities : sequence of Sensitivity
-        Of sweep tables; those that the store's runs give are added.
+        Of sweep tables; those of the stored runs are added.
     level : float
-        Quality that break-down points are about.
+        Level of the break-down points.
     """
     if evaluated is None:
         evaluated = [
@@ -156,14 +156,14 @@ def _costs(store: Store, rows: Sequence[RunRow], labels: Sequence[str]) -> tuple
     return tuple(
         CostPoint(
             label=label,
-            scene=mine[0].scene,
+            scene=own[0].scene,
             points=sizes[scene_id][0],
             hectares=sizes[scene_id][1],
-            cpu_seconds=statistics.median(row.cpu_seconds for row in mine),
-            peak_memory=int(statistics.median(row.peak_memory for row in mine)),
-            runs=len(mine),
+            cpu_seconds=statistics.median(row.cpu_seconds for row in own),
+            peak_memory=int(statistics.median(row.peak_memory for row in own)),
+            runs=len(own),
         )
-        for (label, scene_id), mine in sorted(gathered.items(), key=lambda item: labels.index(item[0][0]))
+        for (label, scene_id), own in sorted(gathered.items(), key=lambda item: labels.index(item[0][0]))
         if scene_id in sizes
     )
 
@@ -177,9 +177,9 @@ def _comparison(rows: Sequence[RunRow], values: Values) -> Comparison | None:
             by_preset.setdefault((row.label, recipe.place), []).append(row)
     pairs = []
     for published in PUBLISHED:
-        mine = [row for preset in published.presets for row in by_preset.get((published.detector, preset), ())]
+        own = [row for preset in published.presets for row in by_preset.get((published.detector, preset), ())]
         complete = all((published.detector, preset) in by_preset for preset in published.presets)
-        pairs.append((published, _ours(mine, values) if complete and mine else None))
+        pairs.append((published, _ours(own, values) if complete and own else None))
     return Comparison(tuple(pairs)) if any(ours for _, ours in pairs) else None
 
 

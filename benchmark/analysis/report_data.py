@@ -1,15 +1,15 @@
-"""What a report draws: frozen data objects, filled by the benchmark from its store.
+"""The data of a report, without any drawing.
 
 Nouns
 -----
 overlay
-    The verdicts of one run on one scene: what a detector found, what it missed, and why.
+    The verdicts of one run on one scene: what the detector found, what it missed, and why.
 scene view
     A scene with its picture, its reference and the overlays of the detectors that ran on it.
 error
-    An object that is wrong, measured by the area in m2 that is wrong about it.
+    A wrong object, with its wrong area in m2.
 size bin
-    Objects of similar footprint area, with how many of them were right.
+    Objects of similar footprint area, with the number of correct ones.
 cost
     Time and memory of a detector on one scene.
 
@@ -78,7 +78,7 @@ class SceneView:
 
 @dataclass(frozen=True, kw_only=True)
 class Error:
-    """An object that is wrong.
+    """A wrong object.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Error:
 
 @dataclass(frozen=True)
 class SizeBin:
-    """Objects with an area from `low` to `high` m2: `right` of `count` were right."""
+    """Objects with an area from `low` to `high` m2: `right` of `count` are correct."""
 
     low: float
     high: float
@@ -111,7 +111,7 @@ class SizeBin:
 
 @dataclass(frozen=True, kw_only=True)
 class SizeCurve:
-    """How one detector does by size: references found (completeness), and detections that are right (correctness)."""
+    """One detector by size: references found (completeness) and correct detections (correctness)."""
 
     label: str
     found: tuple[SizeBin, ...]
@@ -143,7 +143,7 @@ class Sensitivity:
     points : tuple of SensitivityPoint
         In the order of the axis.
     default : Any
-        Value that the detector has when nothing is said; None for generator axes.
+        Default value of the detector; None for generator axes.
     break_down : BreakDown, optional
         Where the index passes a level; None when it was not looked for.
     """
@@ -172,14 +172,14 @@ class CostPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """Where the figures come from.
+    """Where the values come from.
 
     Attributes
     ----------
     facts : tuple of (str, str)
         Name and value, in order: version, command, machine, packages, and so on.
     scenes : tuple of (str, str, str)
-        Name, how it is made again, and content hash.
+        Name, how it can be made again, and content hash.
     """
 
     facts: tuple[tuple[str, str], ...]
@@ -188,7 +188,7 @@ class Provenance:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Report:
-    """Everything that one report shows; empty parts are left out of it.
+    """The contents of one report; empty parts are not shown.
 
     Attributes
     ----------
@@ -198,18 +198,18 @@ class Report:
     matrix : mapping of str to mapping of str to float or None
         Scene to detector to the value of the first board's ranking index (mean over seeds).
     scenes : tuple of SceneView
-        Those that are drawn.
+        Scenes with maps.
     errors : tuple of Error
-        The worst objects.
+        The largest errors.
     sizes : tuple of SizeCurve
     sensitivities : tuple of Sensitivity
     costs : tuple of CostPoint
     comparison : Comparison, optional
-        Published figures beside ours.
+        Published values beside ours.
     gate : GateResult, optional
     provenance : Provenance
     sampling : tuple of str
-        What was left out of the drawings, in words.
+        What was left out of the maps, one sentence each.
     """
 
     title: str

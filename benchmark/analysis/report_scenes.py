@@ -66,8 +66,8 @@ def draw_scenes(
     objects = 0
     order = _spread(by_scene)
     for scene_id in order:
-        mine = by_scene[scene_id]
-        chosen = [mine[label] for label in labels if label in mine][:_MOST_OVERLAYS]
+        own = by_scene[scene_id]
+        chosen = [own[label] for label in labels if label in own][:_MOST_OVERLAYS]
         view = scene_view(store, store.scene(scene_id), chosen, keyed)
         if view is None:
             continue
@@ -127,8 +127,8 @@ def scene_view(store: Store, scene: StoredScene, rows: Iterable[RunRow], keyed: 
 def _spread(by_scene: Mapping[int, Mapping[str, RunRow]]) -> list[int]:
     """Return scenes so that the first ones are of as many groups as possible, as seeds of one preset look alike."""
     groups: dict[str, list[int]] = {}
-    for scene_id, mine in by_scene.items():
-        groups.setdefault(next(iter(mine.values())).scene_group, []).append(scene_id)
+    for scene_id, own in by_scene.items():
+        groups.setdefault(next(iter(own.values())).scene_group, []).append(scene_id)
     first = {scene_id: place for members in groups.values() for place, scene_id in enumerate(members)}
     return sorted(first, key=first.__getitem__)  # stable: groups stay in their order
 

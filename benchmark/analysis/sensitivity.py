@@ -57,7 +57,7 @@ def stored_sensitivities(
     lines = []
     for axis, unit, default, label, by_value in itertools.chain(_scene_axes(rows), _detector_axes(rows)):
         for index in indices:
-            points = tuple(_point(value, mine, values, index) for value, mine in _in_order(by_value))
+            points = tuple(_point(value, own, values, index) for value, own in _in_order(by_value))
             if sum(point.mean is not None for point in points) < 2:
                 continue
             line = Sensitivity(detector=label, axis=axis, unit=unit, index=index, points=points, default=default)
@@ -86,9 +86,9 @@ def read_sweep_table(path: Path, *, indices: Sequence[str] = (), level: float = 
         missing = ", ".join(sorted(needed - set(table.columns)))
         raise InputError(f"{path}: no sweep table, it has no column {missing}; 'roofbench sweep ... -o' writes one")
     lines: list[Sensitivity] = []
-    for (evaluator, detector, axis), mine in table.groupby(["evaluator", "detector", "axis"], sort=False):
-        if axis in mine.columns:
-            lines += _lines_of(mine, str(evaluator), str(detector), str(axis), indices, level)
+    for (evaluator, detector, axis), own in table.groupby(["evaluator", "detector", "axis"], sort=False):
+        if axis in own.columns:
+            lines += _lines_of(own, str(evaluator), str(detector), str(axis), indices, level)
     if not lines:
         raise InputError(f"{path}: holds no axis that was varied alone: sweep without grid=True")
     return lines
@@ -100,7 +100,7 @@ def _lines_of(
     lines = []
     shown = make_evaluator(evaluator).swept_indices(chosen)
     for index in shown:
-        mine = table[table["index"] == index.key]
+        own = table[table["index"] == index.key]
         points = tuple(
             SensitivityPoint(
                 _axis_value(row[axis]),
@@ -109,7 +109,7 @@ def _lines_of(
                 _number(row["high"]),
                 int(row["scenes"]),
             )
-            for row in mine.to_dict("records")
+            for row in own.to_dict("records")
         )
         if points:
             unit, default = _facts_of(axis, detector.partition("[")[0])
@@ -147,7 +147,7 @@ def _scene_axes(rows: Sequence[RunRow]) -> Iterable[Axis]:
     for (name, place, label), by_value in varied.items():
         unit, default = _facts_of(f"scene.{name}", place)
         if default is not None and default not in by_value:
-            seeds = {row.recipe.seed for mine in by_value.values() for row in mine}
+            seeds = {row.recipe.seed for own in by_value.values() for row in own}
             same = [row for row in plain.get((label, place), ()) if row.recipe.seed in seeds]
             by_value = {**by_value, default: same} if same else by_value
         if len(by_value) > 1:
@@ -167,7 +167,7 @@ def _detector_axes(rows: Sequence[RunRow]) -> Iterable[Axis]:
             ((name, value),) = changed.items()
             varied.setdefault((row.detector, name), {}).setdefault(value, []).append(row)
     for (detector, name), by_value in varied.items():
-        scenes = {row.scene for mine in by_value.values() for row in mine}
+        scenes = {row.scene for own in by_value.values() for row in own}
         default = plain[detector][name]
         label = detector.rpartition(":")[2]
         unit, _ = _facts_of(name, detector)

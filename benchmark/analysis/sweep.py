@@ -1,10 +1,10 @@
-"""Sweeps: how a detector's quality moves with one of its parameters, or with what makes a scene hard.
+"""Sweeps: how a detector's quality depends on one of its parameters, or on a property of the scenes.
 
 Nouns
 -----
 axis
-    A parameter of the detector (``tile_size``) or of the generator (``scene.tree_density``) with its values. The
-    value None stands for the default.
+    A parameter of the detector (``tile_size``) or of the generator (``scene.tree_density``) with its values; None is
+    the default.
 point
     One value on one axis, the others at their defaults; or, in a grid, one value on every axis.
 """
@@ -51,7 +51,7 @@ _SCENE = "scene."
 
 @dataclass(frozen=True)
 class Axis:
-    """What is varied: ``tile_size`` or ``scene.slope``, and its values in order."""
+    """A varied parameter, ``tile_size`` or ``scene.slope``, and its values in order."""
 
     name: str
     values: tuple[Any, ...]
@@ -64,7 +64,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Point:
-    """One place of a sweep: the axis that is varied (``grid`` for all) and the values of the varied axes."""
+    """A point of a sweep: the axis that is varied (``grid`` for all) and the values of the varied axes."""
 
     axis: str
     values: Mapping[str, Any]
@@ -72,7 +72,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Points, each with the plan of its runs, and one plan that holds them all, every run once."""
+    """Points, each with the plan of its runs, and one plan with every run once."""
 
     axes: tuple[Axis, ...]
     detectors: tuple[Detector, ...]
@@ -124,7 +124,7 @@ def make_sweep(
     Parameters
     ----------
     suite : Suite
-        Its detectors and scenes are the defaults from which one axis at a time is varied.
+        Its detectors and scenes are the defaults; one axis at a time is varied.
     axes : sequence of Axis
     store : Store
     grid : bool
@@ -147,7 +147,7 @@ def make_sweep(
             part = replace(suite, scenes=_scenes(suite, point), detectors=(DetectorEntry(detector, entry.seeds),))
             points.append((point, entry.detector, make_plan(part, store, rerun=rerun)))
     runs = {run.identity.key: run for _, _, plan in points for run in plan.runs}
-    ordered = sorted(runs.values(), key=lambda run: run.identity.scene.name)  # workers keep the scene they have open
+    ordered = sorted(runs.values(), key=lambda run: run.identity.scene.name)  # workers keep their open scene
     evaluators = points[0][2].evaluators
     detectors = tuple(entry.detector for entry in suite.detectors)
     return Sweep(tuple(axes), detectors, tuple(points), Plan(suite, tuple(ordered), evaluators, rerun))
@@ -182,7 +182,7 @@ def _points(axes: Sequence[Axis], *, grid: bool) -> Iterator[Point]:
 
 
 def _scenes(suite: Suite, point: Point) -> tuple[SceneRecipe | Scene, ...]:
-    """Return the scenes at a point; those that are not synthetic take no part in a sweep of the generator."""
+    """Return the scenes at a point; those that are not synthetic are left out of a sweep of the generator."""
     varied = {name.removeprefix(_SCENE): value for name, value in point.values.items() if name.startswith(_SCENE)}
     if not varied:
         return suite.scenes
@@ -200,7 +200,7 @@ def run_sweep(
     execution: Execution | None = None,
     progress: Callable[[PlannedRun, Outcome], None] | None = None,
 ) -> tuple[pd.DataFrame, tuple[RunRow, ...]]:
-    """Run what is missing; return the tidy table and every run of the sweep.
+    """Execute missing runs; return the tidy table and every run of the sweep.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Run time side by side: the code of a baseline's commit and the code that runs, in turns on one machine.
+"""Run time side by side: the code of a baseline's commit and the running code, alternating on one machine.
 
-Seconds measured on another day or machine say nothing, so the baseline's commit is unpacked beside the working tree
-and both do the same runs in turns (old, new, new, old, ...), each in a process of its own. The figure of a scene is the
-ratio of the lowest processor times; the paired test is over the logarithms of the ratios.
+Times of another day or machine cannot be compared. Hence the baseline's commit is unpacked beside the working tree,
+and both execute the same runs alternately (old, new, new, old, ...), each in a process of its own. The value of a scene
+is the ratio of the lowest processor times; the paired test uses the logarithms of the ratios.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ def time_side_by_side(
     candidate : Baseline
         Of the running code, with detectors named as in the baseline.
     repeats : int
-        Runs of each side on every scene, of which the fastest counts.
+        Number of runs of each side on every scene; the fastest counts.
     margin : float
         Share by which the geometric mean of the ratios may differ from 1: 0.1 is 10 %.
 
     Raises
     ------
     UnsupportedError
-        The baseline names no commit, or the running code is no git checkout that has it.
+        The baseline names no commit, or the running code is no git checkout with that commit.
     """
     with _unpacked(baseline.version.commit) as folder:
         old_path = os.pathsep.join([str(folder), *(entry for entry in sys.path if entry)])
@@ -108,7 +108,7 @@ def _log_ratios(
             side: Task(scene=scene.recipe, detector=found.recipe, seed=found.seeds[0], evaluators=()).to_json()
             for side, found in sides.items()
         }
-        if number == 0:  # compilation and first reads belong to neither
+        if number == 0:  # compilation and first reads are not measured
             for side, task in tasks.items():
                 side.call(task, Limits())
         seconds: dict[IsolatedProcess, list[float]] = {old: [], new: []}

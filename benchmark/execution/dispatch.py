@@ -1,8 +1,8 @@
-"""Dispatch: which run goes next to which slot.
+"""Dispatch: the order in which runs are given to slots.
 
-Opening a scene often costs more than detecting on it, and a worker keeps the scene that it opened last. So the runs of
-one scene stay on one worker as long as there are other scenes for the other workers. Of these runs, those of a detector
-that no other worker is at come first: on a first run ever each then compiles its own kernels, not all the same ones.
+Opening a scene often costs more than detecting on it, and a worker keeps the scene that it opened last. Hence the runs
+of one scene stay on one worker as long as there are other scenes for the other workers. Among these runs, those of
+detectors that run nowhere else come first, so that each kernel is compiled once.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ __all__ = ["Dispatcher"]
 
 
 class Dispatcher:
-    """The runs that wait, by scene."""
+    """The waiting runs, by scene."""
 
     def __init__(self, runs: Iterable[PlannedRun]) -> None:
         self._waiting: dict[str, deque[PlannedRun]] = {}
@@ -27,7 +27,7 @@ class Dispatcher:
         self._at: dict[Slot, str] = {}
 
     def next_for(self, slot: Slot) -> PlannedRun | None:
-        """Return the next run for a slot: of the scene it has, of one that no other has, of the longest queue."""
+        """Return the next run for a slot: of its present scene, else of a free scene, else of the longest queue."""
         scene = self._held.get(slot)
         if scene not in self._waiting:
             if not self._waiting:

@@ -1,10 +1,10 @@
-"""Executors: where tasks are done, all behind ``concurrent.futures.Executor``.
+"""Executors: where tasks run; all of them are a ``concurrent.futures.Executor``.
 
-A *slot* is an executor with the number of tasks that it is given at once. On this machine each worker is a slot of one
-thread with an isolated process of its own, so that the runs of a scene can be kept on the worker that has it open. A
-Dask cluster is one slot; its workers do each task in an isolated process of theirs, so limits and crashes are handled
-the same way there. `InProcess` does tasks at once in the calling process: for objects that no other process can make,
-and for debuggers.
+A *slot* is an executor with the number of tasks that it receives at once. On this machine each worker is a slot with
+one thread and an isolated process, so that the runs of a scene can stay on the worker that has it open. A Dask cluster
+is one slot; its workers run each task in an isolated process, so that limits and crashes are handled in the same way.
+`InProcess` runs tasks immediately in the calling process: for objects that no other process can make, and for
+debuggers.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ __all__ = ["InProcess", "Slot", "cluster_slot", "local_slots"]
 
 T = TypeVar("T")
 
-#: Tasks handed to a slot beyond its workers, so that none of them waits for the store.
+#: Tasks that a slot receives beyond its workers, so that no worker waits for the store.
 _AHEAD = 1
 _CONNECT_SECONDS = 15
 
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """An executor and how many tasks it is given at once."""
+    """An executor and the number of tasks that it receives at once."""
 
     executor: Executor
     capacity: int
 
 
 class InProcess(Executor):
-    """An executor that does a task when it is submitted."""
+    """An executor that runs a task when it is submitted."""
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        """Do it now and return the finished future."""
+        """Run the task and return the finished future."""
         future: Future[T] = concurrent.futures.Future()
         try:
             future.set_result(fn(*args, **kwargs))
@@ -51,14 +51,14 @@ class InProcess(Executor):
 
 @contextmanager
 def local_slots(workers: int) -> Iterator[list[Slot]]:
-    """Yield that many isolated processes on this machine; they end with the block."""
+    """Yield slots for isolated processes on this machine, which end with the block."""
     executors = [ThreadPoolExecutor(max_workers=1, thread_name_prefix=f"roofbench-{n}") for n in range(workers)]
     try:
         yield [Slot(executor, 1 + _AHEAD) for executor in executors]
     finally:
         for executor in executors:
             executor.shutdown(wait=False, cancel_futures=True)
-        close_isolated()  # what still runs has nobody to wait for it
+        close_isolated()  # running tasks are abandoned
         for executor in executors:
             executor.shutdown(wait=True)
 

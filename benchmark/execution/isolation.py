@@ -1,9 +1,9 @@
-"""Isolation: a process of its own for every worker, so that a run that crashes, hangs or eats memory fails alone.
+"""Isolation: one process per worker, so that a run that crashes, hangs or exhausts memory fails alone.
 
-An *isolated process* is a fresh Python that does one task after the other, told by length-prefixed messages over its
-standard streams. Numeric libraries in it use one thread each, because the cores belong to the workers. The caller
-watches time and memory; when a limit is passed or the process dies, the task fails with that reason and the next task
-gets a new process. When the caller dies, even by ``kill -9``, the stream ends and the process leaves.
+An *isolated process* is a new Python interpreter that receives one task after the other as length-prefixed messages
+over its standard streams. Numeric libraries in it use one thread each, because the cores belong to the workers. The
+caller watches time and memory. When a limit is exceeded or the process ends, the task fails with that reason and the
+next task gets a new process. When the caller ends, even by ``kill -9``, the stream closes and the process exits.
 """
 
 from __future__ import annotations
@@ -45,18 +45,18 @@ THREAD_LIMITS = {
 }
 _PACKAGE = __package__
 _START = f"from {_PACKAGE}.isolation import serve; serve()"
-_WATCH_EVERY = 0.05  # seconds between looks at the memory of a worker that has a limit of it
-_LOOK_EVERY = 0.5  # seconds between looks at any other worker
+_WATCH_EVERY = 0.05  # seconds between two checks of a worker with a memory limit
+_LOOK_EVERY = 0.5  # seconds between two checks of any other worker
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What one run may take.
+    """Limits of one run.
 
     Attributes
     ----------
     seconds : float, optional
-        Wall clock, reading of the scene, evaluation, and on the first run of a worker its start included.
+        Wall clock time, including reading of the scene, evaluation, and the start of a new worker.
     memory : int, optional
         Highest resident memory of the worker process, bytes.
     """
@@ -66,7 +66,7 @@ class Limits:
 
 
 class IsolatedProcess:
-    """One worker process; `call` starts it when there is none."""
+    """One worker process, started by the first `call`."""
 
     def __init__(self, *, python_path: str | None = None) -> None:
         self._python_path = python_path
@@ -74,7 +74,7 @@ class IsolatedProcess:
         self._errors: IO[bytes] | None = None
 
     def call(self, task: str, limits: Limits) -> bytes:
-        """Do a task and return its outcome as bytes; death and passed limits are failed outcomes."""
+        """Run a task and return its outcome as bytes; a crash or an exceeded limit is a failed outcome."""
         process = self._running()
         errors = self._errors
         assert errors is not None
@@ -91,11 +91,11 @@ class IsolatedProcess:
             while (message := receiver.poll(_pause(limits, deadline))) is None:
                 peak = highest_memory(process.pid)
                 if deadline is not None and time.monotonic() > deadline:
-                    return self._failed(process, f"time limit of {limits.seconds:g} s passed", started, peak)
+                    return self._failed(process, f"time limit of {limits.seconds:g} s exceeded", started, peak)
                 if limits.memory is not None and peak > limits.memory:
                     return self._failed(process, _too_much(peak, limits.memory), started, peak)
             peak = highest_memory(process.pid)
-            if limits.memory is not None and peak > limits.memory:  # a spike between two looks
+            if limits.memory is not None and peak > limits.memory:  # a peak between two checks
                 return self._failed(process, _too_much(peak, limits.memory), started, peak)
             return message
         except (EOFError, OSError, ValueError):  # ValueError: the stream was closed
@@ -118,14 +118,14 @@ class IsolatedProcess:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(timeout=5)
             reason = _death(process.returncode)
-        told = ""
+        written = ""
         if self._errors is not None:
-            with suppress(OSError, ValueError):  # closed when the caller gave up meanwhile
+            with suppress(OSError, ValueError):  # closed when the caller was interrupted
                 self._errors.seek(0)
-                told = self._errors.read()[-4000:].decode(errors="replace")
+                written = self._errors.read()[-4000:].decode(errors="replace")
         self.close()
         cost = Cost(seconds=time.monotonic() - started, peak_memory=peak)
-        return Outcome(status="failed", reason=reason, traceback=told, cost=cost).to_bytes()
+        return Outcome(status="failed", reason=reason, traceback=written, cost=cost).to_bytes()
 
     def _running(self) -> subprocess.Popen[bytes]:
         if self._process is not None and self._process.poll() is not None:
@@ -137,25 +137,25 @@ class IsolatedProcess:
             environment = {**os.environ, **THREAD_LIMITS, "PYTHONPATH": path}
             self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
-                # -P: what lies in the working directory must not come before the path given, --time sets old code there
+                # -P: the working directory must not come before the given path, which may hold older code.
                 [sys.executable, "-P", "-X", "faulthandler", "-c", _START],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
                 env=environment,
-                start_new_session=True,  # Ctrl-C goes to the caller, who ends its workers in order
+                start_new_session=True,  # Ctrl-C reaches the caller only, which ends its workers
             )
         return self._process
 
 
 def _pause(limits: Limits, deadline: float | None) -> float:
-    """Return for how long to wait for an answer until the next look, seconds."""
+    """Return how long to wait for an answer until the next check, seconds."""
     pause = _LOOK_EVERY if limits.memory is None else _WATCH_EVERY
     return pause if deadline is None else max(0.0, min(pause, deadline - time.monotonic()))
 
 
 def _too_much(peak: int, limit: int) -> str:
-    return f"memory limit of {limit / 1e6:.0f} MB passed: {peak / 1e6:.0f} MB used"
+    return f"memory limit of {limit / 1e6:.0f} MB exceeded: {peak / 1e6:.0f} MB used"
 
 
 def _death(code: int | None) -> str:
@@ -165,7 +165,7 @@ def _death(code: int | None) -> str:
         with suppress(ValueError):
             return f"the worker process was killed by signal {-code} ({signal.Signals(-code).name})"
         return f"the worker process was killed by signal {-code}"
-    return f"the worker process left the interpreter with exit code {code}"
+    return f"the worker process exited with code {code}"
 
 
 _local = threading.local()
@@ -173,7 +173,7 @@ _every: list[IsolatedProcess] = []
 
 
 def call_isolated(task: str, limits: Limits) -> bytes:
-    """Do a task in the isolated process of the calling thread; what is submitted to executors of every kind."""
+    """Run a task in the isolated process of the calling thread; the function that executors of every kind receive."""
     process: IsolatedProcess | None = getattr(_local, "process", None)
     if process is None:
         process = _local.process = IsolatedProcess()
@@ -188,9 +188,9 @@ def close_isolated() -> None:
 
 
 def serve() -> None:
-    """Do tasks from standard input until it ends: the main function of an isolated process."""
+    """Run tasks from standard input until it closes: the main function of an isolated process."""
     inward, outward = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a detector prints must not disturb the messages
+    os.dup2(2, 1)  # output of a detector must not mix with the messages
     tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def listen() -> None:
@@ -198,7 +198,7 @@ def serve() -> None:
             try:
                 tasks.put(_receive(inward))
             except (EOFError, OSError):
-                os._exit(0)  # the caller has gone; a detection in flight is of no use
+                os._exit(0)  # the caller has ended, so nobody needs the result
 
     threading.Thread(target=listen, daemon=True).start()
     from .worker import execute_text
@@ -227,7 +227,7 @@ def _exactly(stream: IO[bytes], size: int) -> bytes:
 
 
 class _Receiver:
-    """One message that arrives in pieces."""
+    """A message that arrives in pieces."""
 
     def __init__(self, stream: IO[bytes] | None) -> None:
         assert stream is not None
@@ -236,7 +236,7 @@ class _Receiver:
         self._size: int | None = None
 
     def poll(self, seconds: float) -> bytes | None:
-        """Wait at most so long; return the message when it is whole."""
+        """Wait for at most this time; return the message when it is complete."""
         with selectors.DefaultSelector() as selector:
             selector.register(self._descriptor, selectors.EVENT_READ)
             if not selector.select(seconds):

@@ -1,7 +1,7 @@
 """Memory of a process: the highest resident memory, bytes, and a bound on what it may allocate.
 
-Linux counts the highest resident memory itself, so no spike is missed between two looks; elsewhere a look sees the
-present memory only.
+Linux records the highest resident memory itself, so that no peak between two checks is missed. On other systems only
+the present memory is known.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ _ALLOCATION_SLACK = 1 << 30  # bytes that libraries may reserve without using th
 
 
 def highest_memory(process: int | None = None) -> int:
-    """Return the highest resident memory of a process (of this one by default); 0 where the system does not tell."""
+    """Return the highest resident memory of a process (by default this one); 0 where the system does not report it."""
     with suppress(OSError, ValueError, StopIteration), open(f"/proc/{process or 'self'}/status") as status:
         line = next(line for line in status if line.startswith("VmHWM"))
         return int(line.split()[1]) * 1024
@@ -26,13 +26,13 @@ def highest_memory(process: int | None = None) -> int:
 
 
 def reset_highest_memory() -> None:
-    """Let the kernel count the highest resident memory of this process anew (Linux only)."""
+    """Reset the kernel's record of the highest resident memory of this process (Linux only)."""
     with suppress(OSError), open("/proc/self/clear_refs", "w") as control:
         control.write("5")
 
 
 def bound_allocations(process: int, memory: int) -> None:
-    """Let one huge allocation fail at once, before a look at the memory could notice it (Linux only)."""
+    """Make a huge allocation fail immediately, before the next check of the memory (Linux only)."""
     import psutil
 
     if hasattr(psutil, "RLIMIT_DATA"):

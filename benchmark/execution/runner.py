@@ -1,4 +1,4 @@
-"""The runner: does what a plan says, stores every outcome in a transaction of its own, and tells what happens."""
+"""The runner: executes a plan and stores every outcome in a transaction of its own."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ class Execution:
 
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """What a plan has come to: rows of the store, in the plan's order.
+    """The result of a plan: rows of the store, in the plan's order.
 
     Attributes
     ----------
     rows : tuple of RunRow
-        Every run of the plan that is stored, done now or before.
+        Every run of the plan that is stored, executed now or before.
     done : int
-        Detections made now.
+        Number of runs that were executed now.
     evaluated : int
-        Stored detections that were evaluated now.
+        Number of stored runs that were evaluated now.
     """
 
     rows: tuple[RunRow, ...]
@@ -87,7 +87,7 @@ def run_plan(
     execution: Execution | None = None,
     progress: Callable[[PlannedRun, Outcome], None] | None = None,
 ) -> RunResult:
-    """Do what is to be done and return what is stored.
+    """Execute what the plan lacks and return its stored runs.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def run_plan(
     execution : Execution, optional
         One worker process by default.
     progress : callable, optional
-        Told every finished run with its outcome.
+        Called with every finished run and its outcome.
     """
     execution = execution or Execution()
     version = str(code_version())
@@ -104,7 +104,7 @@ def run_plan(
     for run in plan.runs:
         if run.todo == "evaluate":
             assert run.stored is not None
-            score_stored(store, run.stored, run.lacking)
+            score_stored(store, run.stored, run.missing)
             evaluated += 1
     waiting = [run for run in plan.runs if run.todo == "detect"]
     done = 0
@@ -119,9 +119,9 @@ def run_plan(
 
 
 def score_stored(store: Store, run_id: int, evaluators: tuple[KeyedEvaluator, ...]) -> int:
-    """Evaluate stored detections by further evaluators; nothing is detected and no scene is opened.
+    """Evaluate stored detections by further evaluators, without detecting again and without opening the scene.
 
-    Returns how many evaluations were added: none for a scene without reference.
+    Returns the number of added evaluations: none for a scene without reference.
     """
     scene = store.scene(store.run(run_id).scene_id)
     if scene.reference is None:
@@ -136,7 +136,7 @@ def score_stored(store: Store, run_id: int, evaluators: tuple[KeyedEvaluator, ..
 def _outcomes(
     runs: list[PlannedRun], plan: Plan, store: Store, execution: Execution
 ) -> Iterator[tuple[PlannedRun, Outcome]]:
-    """Yield outcomes as they come in; a run that another process stored meanwhile is left out."""
+    """Yield outcomes as they arrive; runs that another process stored in the meantime are left out."""
     if not runs:
         return
     described = store.described_scenes()
@@ -186,11 +186,11 @@ def _in_process(run: PlannedRun, task: Task, plan: Plan) -> bytes:
 
 
 def _outcome(future: Future[bytes]) -> Outcome:
-    """Return the outcome of a future; what the executor itself raises is the failure of that run."""
+    """Return the outcome of a future; an error of the executor itself is a failure of that run."""
     try:
         return Outcome.from_bytes(future.result())
     except Exception as error:
-        return Outcome(status="failed", reason=f"the executor gave up: {type(error).__name__}: {error}")
+        return Outcome(status="failed", reason=f"the executor failed: {type(error).__name__}: {error}")
 
 
 def _is_stored(store: Store, run: PlannedRun) -> bool:
@@ -204,7 +204,7 @@ def _must_be_portable(run: PlannedRun) -> None:
 
 
 class _Scenes:
-    """Recipes that workers can open; scenes of this process are spooled once."""
+    """Recipes that workers can open; each scene object of this process is written to a file once."""
 
     def __init__(self, stack: ExitStack, *, elsewhere: bool) -> None:
         self._stack = stack

@@ -1,8 +1,8 @@
-"""A scene as one small picture: what the verdicts of a report are drawn over.
+"""A scene as one small picture, the background for the verdicts in a report.
 
 A *picture* is the orthoimage, or where there is none the height above ground, shaded, as WebP. It covers the extent of
-the scene exactly, row 0 in the north. Workers make it while they have the scene open, so that nothing is generated or
-read again for a report; matplotlib is not needed.
+the scene exactly, row 0 in the north. Workers make it while the scene is open, so that a report neither generates nor
+reads it again; matplotlib is not needed.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from ...scenes.scene import Scene
 
 __all__ = ["ScenePicture", "scene_picture"]
 
-#: Most pixels along the longer side, and the finest pixel in metres: enough to see a shed, small enough to store.
+#: Maximum number of pixels along the longer side, and the smallest pixel in metres: a shed is visible, the file small.
 _MOST_PIXELS = 1600
 _FINEST = 0.2
 _QUALITY = 82
-#: Height above ground (m) to colour: ground, hedges, houses, halls, towers; light to dark, so that it reads in grey.
+#: Height above ground (m) to colour: ground, hedges, houses, halls, towers; light to dark, so that it works in grey.
 _HEIGHTS = (0.0, 2.0, 5.0, 10.0, 20.0, 60.0)
 _TINTS = ((236, 233, 226), (206, 213, 190), (140, 178, 170), (79, 134, 155), (58, 84, 128), (52, 36, 88))
 
@@ -41,7 +41,7 @@ class ScenePicture:
     width, height : int
         Pixels.
     shows : str
-        What is seen, in words.
+        What the picture shows, as a caption.
     """
 
     content: bytes
@@ -56,7 +56,7 @@ class ScenePicture:
             return cls(content, bitmap.width, bitmap.height, shows or str(bitmap.getexif().get(_DESCRIPTION, "")))
 
     def at_most(self, pixels: int, *, quality: int = 70) -> ScenePicture:
-        """Return the picture with at most so many pixels along its longer side."""
+        """Return the picture with at most `pixels` along its longer side."""
         with Bitmap.open(io.BytesIO(self.content)) as bitmap:
             bitmap.thumbnail((pixels, pixels), Bitmap.Resampling.LANCZOS)
             return _encoded(bitmap, self.shows, quality)
@@ -126,7 +126,7 @@ def _fitted(
     """Return the part of a picture on a grid that an extent covers, at a size in pixels."""
     upper, left = grid.to_pixel(extent[0], extent[3])
     lower, right = grid.to_pixel(extent[2], extent[1])
-    # Reduced first by averaging whole blocks: a plain transform would skip pixels and flicker.
+    # First reduced by averaging whole blocks: a transform alone would skip pixels (aliasing).
     step = max(1, int(min((right - left) / size[0], (lower - upper) / size[1])))
     reduced = bitmap.reduce(step) if step > 1 else bitmap
     box = (float(left) / step, float(upper) / step, float(right) / step, float(lower) / step)
@@ -152,7 +152,7 @@ def _tinted(height: NDArray[np.float32], cell: float) -> NDArray[np.uint8]:
     colour = np.stack([np.interp(height, _HEIGHTS, tints[:, band]) for band in range(3)], axis=-1)
     if min(height.shape) > 1:
         south, east = np.gradient(np.clip(height, -2, 80), cell)
-        # Half the relief: roofs of a storey or two and towers shall both show their faces.
+        # Half the relief, so that the faces of low roofs and of towers are both visible.
         south, east = 0.5 * south, 0.5 * east
         light = (1 + (east + south) / np.sqrt(2)) / np.sqrt(2 * (1 + east**2 + south**2))
         colour *= (0.5 + 0.5 * np.clip(light / np.sqrt(0.5), 0, 1.25))[..., None]

@@ -17,7 +17,7 @@ __all__ = ["Task"]
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """One run to be done.
+    """A run to be executed.
 
     Attributes
     ----------
@@ -26,9 +26,9 @@ class Task:
         Of the detector's random stream; 0 when it draws no random numbers.
     evaluators : tuple of PluginRecipe
     codes : tuple of str
-        Digest of the source that each evaluator depends on, where the caller has read it already.
+        Digest of the source of each evaluator, where the caller knows it.
     describe_scene : bool
-        Whether the outcome shall describe the scene and its reference, because the store does not know them yet.
+        Whether the outcome should describe the scene and its reference, because they are not stored yet.
     """
 
     scene: SceneRecipe
@@ -53,7 +53,7 @@ class Task:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Read what `to_json` wrote."""
+        """Return the task of a text that `to_json` made."""
         values = json.loads(text)
         return cls(
             scene=SceneRecipe.from_dict(values["scene"]),

@@ -1,4 +1,4 @@
-"""The worker: does one task in whichever process it is called, and reports failures instead of raising them."""
+"""The worker: runs one task in the calling process, and returns failures as outcomes instead of raising them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .tasks import Task
 
 __all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream"]
 
-#: Scenes that were opened last; neighbouring tasks of a plan are about one scene.
+#: The scenes opened last; consecutive tasks of a plan often use the same scene.
 _scenes: OrderedDict[str, Scene] = OrderedDict()
 _KEPT_SCENES = 2
 
@@ -52,7 +52,7 @@ def random_stream(seed: int, scene: Scene, detector: Detector) -> np.random.Gene
 
 
 def execute_text(task: str) -> bytes:
-    """Do a task given as text; the form in which tasks travel between processes."""
+    """Run a task given as text, the form in which tasks are sent between processes."""
     return execute(Task.from_json(task)).to_bytes()
 
 
@@ -63,7 +63,7 @@ def execute(
     detector: Detector | None = None,
     evaluators: Sequence[Evaluator] | None = None,
 ) -> Outcome:
-    """Do a task. A failure or a skip is an outcome, too.
+    """Run a task; a failure or a skip is an outcome, too.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def execute(
         The objects themselves, where task and caller share a process.
     """
     started = time.perf_counter(), time.process_time()
-    reset_highest_memory()  # a limit is about this run, not about those before it
+    reset_highest_memory()  # a limit applies to this run, not to earlier ones
     try:
         scene = scene if scene is not None else _opened(task.scene)
         detector = detector if detector is not None else task.detector.detector()
@@ -91,12 +91,12 @@ def execute(
         codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
         scores = score(detected, scene, list(zip(task.evaluators, codes, evaluators, strict=True)))
     except Exception as error:
-        told = str(error) if isinstance(error, RoofbenchError) else f"{type(error).__name__}: {error}"
+        reason = str(error) if isinstance(error, RoofbenchError) else f"{type(error).__name__}: {error}"
         if isinstance(error, MemoryError):
-            told = f"out of memory: {error}".rstrip(": ")
+            reason = f"out of memory: {error}".rstrip(": ")
         return Outcome(
             status="failed",
-            reason=" ".join(told.split())[:500],
+            reason=" ".join(reason.split())[:500],
             traceback=traceback.format_exc(),
             cost=_cost_since(started),
             machine=machine_facts(),
@@ -114,7 +114,7 @@ def execute(
 
 
 def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecipe, str, Evaluator]]) -> list[Score]:
-    """Return what each evaluator says; nothing for a scene without reference."""
+    """Return the score by each evaluator; none for a scene without reference."""
     if scene.reference is None:
         return []
     scores = []
@@ -125,7 +125,7 @@ def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecip
 
 
 def describe(scene: Scene) -> SceneRecord:
-    """Return what the store keeps of a scene."""
+    """Return the record of a scene."""
     reference, grid, picture = scene.reference, scene.evaluation_grid, scene_picture(scene)
     labels = None if reference is None or reference.building_ids is None else reference.building_ids
     return SceneRecord(
@@ -162,7 +162,7 @@ def _opened(recipe: SceneRecipe) -> Scene:
 
 
 def _read(scene: Scene) -> None:
-    """Read what the detector may ask for before the clock starts: its time is that of detection in memory."""
+    """Read all inputs before the clock starts: the time of a detector is that of detection in memory."""
     _ = scene.points, scene.image, scene.dem
 
 
@@ -176,7 +176,7 @@ def _cost_since(started: tuple[float, float]) -> Cost:
 
 @cache
 def machine_facts() -> Mapping[str, Any]:
-    """Return where the work is done: host, processor, cores, system, Python."""
+    """Return facts of this machine: host, processor, cores, system, Python."""
     return {
         "host": platform.node(),
         "system": f"{platform.system()} {platform.machine()}",

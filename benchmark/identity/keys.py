@@ -1,4 +1,4 @@
-"""Content keys: what a stored result depends on, so that nothing is computed twice and nothing stale is believed.
+"""Content keys: everything that a stored result depends on, so that equal runs are computed once.
 
 Nouns
 -----
@@ -6,8 +6,8 @@ key parts
     Everything that decides the footprints of a run: detector, its source closure, its parameters, the versions of the
     packages it imports, the scene, the seed. The *key* is their SHA-256.
 source closure
-    The modules that a class reaches by its imports inside its own package (and those of roofbench that it uses). Each
-    counts by its syntax tree without docstrings: comments, formatting and documentation change no key.
+    The modules that a class reaches by its imports inside its own package (and those of roofbench that it uses). Of
+    each, the syntax tree without docstrings counts: comments, formatting and documentation do not change keys.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ def digest(value: Any) -> str:
 
 
 def random_stream_entropy(seed: int, scene: str, detector: str) -> list[int]:
-    """Return the entropy of a task's random stream: from seed, scene name and detector name, never from order.
+    """Return the entropy of a task's random stream; it follows from seed, scene and detector, never from the order.
 
-    Parameters are left out on purpose: a sweep compares them under common random numbers.
+    Parameters are left out on purpose: a sweep compares their values under common random numbers.
     """
     return [seed, *(int(digest(text)[:16], 16) for text in (scene, detector))]
 
@@ -134,8 +134,8 @@ def _walk(module: str, path: Path, modules: dict[str, str], imported: set[str]) 
 def _resolve(target: str, home: str, folder: Path) -> tuple[str, Path] | None:
     """Return the module behind an import when it belongs to roofbench, to the plugin's package or lies beside it.
 
-    ``package.module.name`` may be a module or a name within one; package files that only hold a docstring or the lazy
-    public API say nothing about behaviour and are left out with the root.
+    ``package.module.name`` may be a module or a name within one. The root, which only resolves public names, is left
+    out.
     """
     top = target.partition(".")[0]
     if (top in (NAME, home) and not home.startswith("roofbench_plugin_")) or top == NAME:
@@ -235,7 +235,7 @@ def _module_file(name: str) -> Path | None:
 
 
 def _digest_without_file(plugin: type[Any]) -> str:
-    """Digest a class that has no file (typed at a prompt): its source where Python knows it, else its bytecode."""
+    """Return the digest of a class without a file (typed at a prompt): of its source, else of its bytecode."""
     try:
         return digest(inspect.getsource(plugin))
     except (OSError, TypeError):

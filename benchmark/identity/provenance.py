@@ -1,4 +1,4 @@
-"""Provenance: which roofbench this is, down to the commit and whether the working tree was changed."""
+"""Provenance: version and commit of the running code, and whether the working tree has changes."""
 
 from __future__ import annotations
 

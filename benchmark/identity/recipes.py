@@ -1,7 +1,7 @@
-"""Recipes: how a scene, a detector or an evaluator is made again in another process or on another day.
+"""Recipes: how a scene, a detector or an evaluator can be made again in another process or later.
 
-A recipe is a few words that JSON holds (a folder, a preset with a seed, a name with parameters), so that tasks, plans
-and the store carry recipes and paths instead of megabytes.
+A recipe is short and fits in JSON (a folder, a preset with a seed, a name with parameters), so that tasks, plans and
+the store carry recipes and paths instead of megabytes.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class PluginRecipe:
 
     @classmethod
     def of(cls, plugin: Detector | Evaluator) -> Self:
-        """Return the recipe of an object, or raise `UnsupportedError` when another process cannot make its class."""
+        """Return the recipe of an object; raise `UnsupportedError` when another process cannot import its class."""
         kind = type(plugin)
         registry: Registry = DETECTORS if isinstance(plugin, Detector) else EVALUATORS
         module = sys.modules.get(kind.__module__)
@@ -98,7 +98,7 @@ class SceneRecipe:
     Attributes
     ----------
     kind : {"folder", "preset", "builtin", "spooled", "memory"}
-        ``spooled`` is a scene of this process that was laid down in a file for other processes; ``memory`` one that
+        ``spooled`` is a scene of this process that was written to a file for other processes; ``memory`` one that
         stays in this process.
     name : str
         Name in tables: ``knox-small-3[tree_density=40]``.
@@ -107,7 +107,7 @@ class SceneRecipe:
     seed : int
         Of a preset and of the built-in scene.
     parameters : mapping
-        Generator parameters that were set; they are the axes of a sweep.
+        Parameters of the generator that differ from the preset; the axes of a sweep.
     content_hash : str
         Of a scene in memory or spooled, else empty.
     """
@@ -147,7 +147,7 @@ class SceneRecipe:
 
     @property
     def word(self) -> str:
-        """How the scene is named on the command line: its folder, or ``preset[seed=3,tree_density=40]``."""
+        """The scene on the command line: its folder, or ``preset[seed=3,tree_density=40]``."""
         if self.kind in ("preset", "builtin"):
             values = {"seed": self.seed, **self.parameters}
             return f"{self.place}[{','.join(f'{name}={value}' for name, value in values.items())}]"
@@ -155,7 +155,7 @@ class SceneRecipe:
 
     @property
     def group(self) -> str:
-        """What the scene is one of: the preset with its parameters but without its seed, else its own name."""
+        """The group of the scene: the preset with its parameters but without its seed, else the name."""
         if self.kind not in ("preset", "builtin"):
             return self.name
         return self.place + self.name.removeprefix(f"{self.place}-{self.seed}")
@@ -183,7 +183,9 @@ class SceneRecipe:
         if self.kind == "spooled":
             return read_spooled(Path(self.place), name=self.name)
         if self.kind == "memory":
-            raise UnsupportedError(f"scene {self.name!r} lives in the memory of another process: spool it first")
+            raise UnsupportedError(
+                f"scene {self.name!r} exists in the memory of another process only: save it as a folder first"
+            )
         return make_scene(self.place, seed=self.seed, **self.parameters)
 
     def to_dict(self) -> dict[str, Any]:
@@ -199,7 +201,7 @@ class SceneRecipe:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Read what `to_dict` wrote."""
+        """Return the recipe of what `to_dict` returned."""
         return cls(**cast("dict[str, Any]", dict(values)))
 
 

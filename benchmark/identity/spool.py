@@ -1,7 +1,7 @@
-"""Spooled scenes: scenes of this process laid down in a file, exactly, so that other processes can open them.
+"""Spooled scenes: scenes of this process written to a temporary file, so that other processes can open them.
 
-A scene folder is for people and rounds coordinates to what LAZ holds; a spooled scene is a numpy archive of the very
-arrays, short-lived and private to one run.
+A scene folder rounds coordinates to the resolution of LAZ. A spooled scene is a numpy archive of the unchanged arrays;
+it is private to one run and deleted after it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The file of a results store: how it is opened, and how runs are chosen in it.
 
-Apart from the store, because a listing of runs needs nothing else and must not wait for numeric libraries.
+It is a module of its own because a listing of runs needs nothing else and should not wait for numeric libraries.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _BUSY_SECONDS = 60
 
 
 def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
-    """Open a store, made when missing and brought to the current schema; one in a read-only folder to be read.
+    """Open a store, create it where missing, and update its schema; one in a read-only folder is opened for reading.
 
     Raises
     ------
     InputError
-        It must exist and does not, is no store, or is one of a newer version.
+        The file is missing although it must exist, is no store, or was written by a newer version.
     OutputError
         It cannot be opened.
     """
@@ -32,18 +32,18 @@ def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
         raise InputError(f"{path}: no such results store; 'roofbench run' makes one, or name it by store=")
     if not path.parent.is_dir():
         raise OutputError(f"{path} cannot be written: there is no folder {path.parent}")
-    # In a folder that cannot be written SQLite finds no place for its side files: the store is opened to be read.
-    sealed = path.is_file() and not os.access(path.parent, os.W_OK)
-    name = f"{path.resolve().as_uri()}?immutable=1" if sealed else path
+    # SQLite needs to write side files beside the store; without permission it is opened for reading only.
+    read_only = path.is_file() and not os.access(path.parent, os.W_OK)
+    name = f"{path.resolve().as_uri()}?immutable=1" if read_only else path
     try:
-        db = sqlite3.connect(name, timeout=_BUSY_SECONDS, isolation_level=None, uri=sealed)
+        db = sqlite3.connect(name, timeout=_BUSY_SECONDS, isolation_level=None, uri=read_only)
     except sqlite3.OperationalError as error:
         raise OutputError(f"{path} cannot be opened as results store: {error}") from error
     try:
         db.execute(f"PRAGMA busy_timeout = {_BUSY_SECONDS * 1000}")
         db.row_factory = sqlite3.Row
         prepare(db, path)
-        if sealed:
+        if read_only:
             return db
         db.execute("PRAGMA journal_mode = WAL")
         db.execute("PRAGMA synchronous = NORMAL")
@@ -59,7 +59,7 @@ def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
 def run_filter(
     *, status: str | None = None, detector: str | None = None, scene: str | None = None
 ) -> tuple[str, list[Any]]:
-    """Return the condition and its values that choose runs among ``runs JOIN scenes``.
+    """Return a condition that selects runs among ``runs JOIN scenes``, and its values.
 
     Parameters
     ----------

@@ -28,14 +28,14 @@ Status = Literal["ok", "failed", "skipped"]
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """What a detection cost, reading of the scene and evaluation excluded.
+    """The cost of a detection, without reading the scene and without evaluation.
 
     Attributes
     ----------
     seconds, cpu_seconds : float
         Wall clock, and processor time of all threads.
     peak_memory : int
-        Highest resident memory of the process during detection, bytes; 0 where the system does not tell.
+        Highest resident memory of the process during detection, bytes; 0 where the system does not report it.
     """
 
     seconds: float = 0.0
@@ -45,7 +45,7 @@ class Cost:
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """One evaluation as the store keeps it; `summarise` of its evaluator gives the indices back without geometry.
+    """An evaluation as it is stored; `summarise` of its evaluator derives the indices again without geometry.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Score:
 
     @classmethod
     def of(cls, evaluation: Evaluation, recipe: PluginRecipe, code: str) -> Self:
-        """Take what is kept from an evaluation."""
+        """Return the score of an evaluation."""
         given = evaluation.verdicts
         return cls(
             evaluator=recipe,
@@ -82,7 +82,7 @@ class Score:
 
 
 def plain_value(value: Any) -> Any:
-    """Return a Python number, text or None of what a table or an evaluation holds; not-a-number becomes None."""
+    """Return a value as Python number, text or None; NaN becomes None."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, bool | int | str):
@@ -94,7 +94,7 @@ def plain_value(value: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneRecord:
-    """What the store keeps of a scene: enough to evaluate and to draw verdicts without opening it again.
+    """A scene as it is stored: enough to evaluate and to draw verdicts without opening it again.
 
     `picture` is a WebP file over the extent (see `scene_picture`), `point_count` the size of the point cloud.
     """
@@ -114,26 +114,26 @@ class SceneRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What became of a task.
+    """The result of a task.
 
     Attributes
     ----------
     status : {"ok", "failed", "skipped"}
     reason : str
-        One sentence of a failure or skip, else empty.
+        One sentence for a failure or skip, else empty.
     traceback : str
-        Of a failure, with the end of what the worker wrote to standard error.
+        Of a failure, or the end of the worker's standard error.
     cost : Cost
     detections : tuple of bytes
         WKB of each raw detection.
     attributes : mapping of str to list
         Further columns of the detections.
     metadata : mapping
-        Facts of the whole set, and repairs.
+        Facts about the whole set, and repairs.
     scores : tuple of Score
     scene : SceneRecord, optional
     machine : mapping
-        Where it ran.
+        Facts about the machine.
     """
 
     status: Status
@@ -169,7 +169,7 @@ class Outcome:
 
     @classmethod
     def from_bytes(cls, message: bytes) -> Self:
-        """Read what `to_bytes` wrote."""
+        """Return the outcome of bytes that `to_bytes` made."""
         size, count = struct.unpack_from("<QQ", message)
         header = json.loads(message[16 : 16 + size])
         start = 16 + size
@@ -198,7 +198,7 @@ class Outcome:
 
 
 def _fields(record: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass by name, without going deeper as `dataclasses.asdict` does."""
+    """Return the fields of a dataclass by name; unlike `dataclasses.asdict` not recursive."""
     return {field.name: getattr(record, field.name) for field in fields(record)}
 
 
@@ -211,7 +211,7 @@ def footprints_of(
     attributes: Mapping[str, Sequence[Any]] | None = None,
     source: str,
 ) -> Footprints:
-    """Return stored geometries, which were checked when they came in, as footprints."""
+    """Return stored geometries as footprints; they were checked before they were stored."""
     polygons: NDArray[np.object_] = np.empty(len(wkb), dtype=object)
     polygons[:] = shapely.from_wkb(list(wkb))
     return Footprints(

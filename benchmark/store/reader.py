@@ -30,17 +30,17 @@ _SELECT_RUNS = """SELECT runs.id, runs.key, detector, label, parameters AS param
 
 
 class StoreReader:
-    """What can be read from an open store."""
+    """Queries of an open store."""
 
     path: Path
     _db: sqlite3.Connection
 
     def last_plan(self) -> Mapping[str, Any]:
-        """Return what was asked for last."""
+        """Return the content of the plan that was run last."""
         row = self._db.execute("SELECT content FROM plans ORDER BY id DESC LIMIT 1").fetchone()
         if row is None:
             raise InputError(
-                f"{self.path} holds no plan to resume: name a suite or scenes; a sweep goes on by its own command"
+                f"{self.path} contains no plan to resume: name a suite or scenes; to resume a sweep repeat its command"
             )
         content: Mapping[str, Any] = json.loads(row["content"])
         return content
@@ -119,7 +119,7 @@ class StoreReader:
         if len(rows) != 1:
             found = "several runs" if rows else "no run"
             raise UnknownNameError(
-                f"{self.path} has {found} called {text!r}: 'roofbench ls' shows their numbers and keys"
+                f"{self.path} contains {found} named {text!r}: 'roofbench ls' shows their numbers and keys"
             )
         return rows[0]
 
@@ -170,7 +170,7 @@ class StoreReader:
         return {int(row[0]): row[1] for row in self._db.execute("SELECT id, content_hash FROM scenes")}
 
     def commands(self) -> list[str]:
-        """Return the commands that asked for runs, in order."""
+        """Return the commands whose runs are stored, in order."""
         return [str(row[0]) for row in self._db.execute("SELECT command FROM plans ORDER BY id")]
 
     def scene_picture(self, scene_id: int) -> bytes | None:

@@ -1,7 +1,7 @@
-"""Records of the results store: what identifies a run, and rows as they are read.
+"""Records of the results store: the identity of a run, and rows as they are read.
 
-A *run key* stands for everything that decides the detections, an *evaluation key* for an evaluator with its parameters
-and code.
+A *run key* is a digest of everything that determines the detections, an *evaluation key* of an evaluator with its
+parameters and code.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class RunIdentity:
     ----------
     detector : PluginRecipe
     label : str
-        Name with changed parameters, for tables; no part of the key.
+        Name with changed parameters, for tables; not part of the key.
     fingerprint : str
-        Of what the detector reads besides the scene.
+        Digest of what the detector reads besides the scene.
     code : SourceClosure
     scene : SceneRecipe
     scene_key : str
@@ -68,7 +68,7 @@ class RunIdentity:
 
 
 class RunRow(NamedTuple):
-    """One stored run, without its detections; a tuple, because a listing makes very many of them."""
+    """A stored run without its detections; a tuple, because many of them are made."""
 
     id: int
     key: str
@@ -100,13 +100,13 @@ class RunRow(NamedTuple):
 
     @property
     def recipe(self) -> SceneRecipe:
-        """How its scene is opened again."""
+        """The recipe of its scene."""
         return SceneRecipe.from_dict(json.loads(self.recipe_text))
 
 
 @dataclass(frozen=True, kw_only=True)
 class StoredScene:
-    """A scene as the store knows it; `reference` is None until it was opened once, or when it has none."""
+    """A stored scene; `reference` is None before the scene was opened for the first time, or when it has none."""
 
     id: int
     key: str

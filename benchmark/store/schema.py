@@ -142,7 +142,7 @@ MIGRATIONS: tuple[str, ...] = (
 
 
 def prepare(connection: sqlite3.Connection, path: Path) -> None:
-    """Bring a store to the current version, or raise `InputError` when it is not a store of ours or a newer one."""
+    """Update a store to the current version; raise `InputError` for another database or a store of a newer version."""
     try:
         (version,) = connection.execute("PRAGMA user_version").fetchone()
         tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
@@ -158,7 +158,9 @@ def prepare(connection: sqlite3.Connection, path: Path) -> None:
         return
     connection.execute("BEGIN IMMEDIATE")
     try:
-        (version,) = connection.execute("PRAGMA user_version").fetchone()  # another process may have been faster
+        (version,) = connection.execute(
+            "PRAGMA user_version"
+        ).fetchone()  # another process may have migrated it in the meantime
         for script in MIGRATIONS[version:VERSION]:
             for statement in _statements(script):
                 connection.execute(statement)
@@ -170,6 +172,6 @@ def prepare(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def _statements(script: str) -> list[str]:
-    """Split a script at its semicolons; `executescript` would commit on its own."""
+    """Split a script at its semicolons; `executescript` would commit."""
     lines = [line.partition("--")[0] for line in script.splitlines()]
     return [statement for statement in "\n".join(lines).split(";") if statement.strip()]

@@ -1,8 +1,7 @@
 """The results store: one SQLite file with runs, raw detections, index values and verdicts.
 
-One transaction a run, so a killed sweep loses at most the runs in flight. Write-ahead logging and a busy timeout let
-several processes write to one store at once. A key that is stored is never computed again, except that failures are
-tried again.
+Each run is one transaction, so that a killed sweep loses at most the unfinished runs. Write-ahead logging and a busy
+timeout let several processes write to one store at once. Stored results are reused, failures are repeated.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ class Store(StoreReader):
     Parameters
     ----------
     path : path
-        SQLite file, made when missing.
+        SQLite file, created where missing.
     must_exist : bool
-        Refuse a file that is not there, for commands that only read.
+        Raise an error for a missing file; for commands that only read.
     """
 
     def __init__(self, path: str | Path, *, must_exist: bool = False) -> None:
@@ -70,7 +69,7 @@ class Store(StoreReader):
     def record(self, identity: RunIdentity, outcome: Outcome, *, version: str, replace: bool = False) -> int:
         """Store an outcome in one transaction and return the run's id.
 
-        A stored result that is good (``ok`` or ``skipped``) stays when `replace` is false: another process was faster.
+        A stored ``ok`` or ``skipped`` result of another process is kept unless `replace` is true.
         """
         with self._transaction() as db:
             scene_id = self._scene(identity.scene, identity.scene_key, outcome.scene)
@@ -117,7 +116,7 @@ class Store(StoreReader):
         return run_id
 
     def add_score(self, run_id: int, score: Score) -> None:
-        """Store a further evaluation of a stored run; one that is there already stays."""
+        """Store a further evaluation of a stored run; an existing one is kept."""
         with self._transaction():
             self._score(run_id, score)
 
@@ -203,7 +202,7 @@ class Store(StoreReader):
         return int(self._db.execute("SELECT id FROM machines WHERE facts = ?", (text,)).fetchone()[0])
 
     def save_plan(self, name: str, command: str, content: Mapping[str, Any]) -> None:
-        """Remember what was asked for, so that ``--resume`` needs no suite file."""
+        """Store the content of a plan, so that it can be resumed without the suite file."""
         with self._transaction() as db:
             text = canonical(dict(content))
             db.execute("DELETE FROM plans WHERE content = ?", (text,))

@@ -42,7 +42,7 @@ def test_run_prints_a_leaderboard_and_writes_files(cli, misbehaving, tmp_path):
 
 def test_a_failing_detector_is_exit_code_3_with_reason_and_command(cli, misbehaving):
     result = cli("run", "hamlet", "-d", f"{misbehaving}[mode=leaves]", "-d", misbehaving, code=3)
-    assert "failed misbehaving[mode=leaves] on hamlet-1, seed 0: the worker process left" in result.stderr
+    assert "failed misbehaving[mode=leaves] on hamlet-1, seed 0: the worker process exited" in result.stderr
     assert "repeat: roofbench detect" in result.stderr
     assert "misbehaving" in result.stdout
 
@@ -84,7 +84,7 @@ def test_why_says_what_a_run_depends_on(cli, misbehaving):
     assert "Traceback" in failed
     assert "failures are tried again" in failed
     assert "Nothing that it depends on has changed: it would not be run again." in cli("why", 2).stdout
-    assert "no run called '77'" in cli("why", 77, code=2)
+    assert "no run named '77'" in cli("why", 77, code=2)
 
 
 def test_score_judges_stored_detections_anew(cli, misbehaving):
@@ -227,7 +227,7 @@ def bad_plugins(tmp_path_factory):
 @pytest.mark.parametrize(
     ("name", "problem"),
     [
-        ("Leaves", "left the interpreter with exit code 0"),
+        ("Leaves", "exited with code 0"),
         ("Crashes", "killed by signal 9"),
         ("Stumbles", "ZeroDivisionError: no houses at all"),
     ],

@@ -1,83 +1,184 @@
+"""Ranking, pooling and significance of leaderboards, on evaluations of a few squares."""
+
+import itertools
+import json
+
 import pytest
+import shapely
 
-import roofbench as rb
+from roofbench.benchmark.analysis.leaderboard import make_leaderboard, repeat_command, unsuccessful_runs
+from roofbench.benchmark.identity.recipes import SceneRecipe
+from roofbench.benchmark.plan import KeyedEvaluator
+from roofbench.benchmark.store.records import RunRow
 from roofbench.core.errors import UnknownNameError
-from roofbench.scenes.builtin import hamlet
+from roofbench.evaluators.registry import make_evaluator
+from roofbench.scenes.geodata.footprints import Footprints
+
+KEYED = KeyedEvaluator.of(make_evaluator("threshold-free"))
+CRS = "EPSG:25832"
 
 
-@pytest.fixture(scope="module")
-def path_of_plugin():
-    from pathlib import Path
-
-    return f"{Path(__file__).parents[2] / 'plugins' / 'misbehaving.py'}:Misbehaving"
+def squares(count, shift=0.0):
+    return Footprints.of([shapely.box(20 * n + shift, 0, 20 * n + 10 + shift, 10) for n in range(count)], crs=CRS)
 
 
-@pytest.fixture(scope="module")
-def board(path_of_plugin, tmp_path_factory):
-    store = tmp_path_factory.mktemp("board") / "a.sqlite"
-    return rb.run(
-        scenes=["hamlet[seed=1]", "hamlet[seed=2]", "hamlet[seed=3]"],
-        detectors=[
-            f"{path_of_plugin}[side=4]",
-            f"{path_of_plugin}[side=9]",
-            f"{path_of_plugin}[mode=raises,only_on=hamlet-2]",
-        ],
-        seeds=2,
-        store=store,
-        index="pixel.quality",
+class Memory:
+    """What a leaderboard asks of a store."""
+
+    def __init__(self, evaluations, references):
+        self._evaluations, self._references = evaluations, references
+
+    def evaluations(self, run_ids, evaluator, key):
+        assert key == KEYED.key
+        return {run_id: self._evaluations[run_id] for run_id in run_ids if run_id in self._evaluations}
+
+    def reference_counts(self):
+        return self._references
+
+
+class Runs:
+    """Rows and evaluations, run by run."""
+
+    def __init__(self):
+        self.rows, self.evaluations, self.references = [], {}, {}
+
+    def add(self, label, scene, found=None, *, of=10, shift=0.5, seed=0, status="ok", **costs):
+        number = len(self.rows) + 1
+        recipe = SceneRecipe.of_preset("hamlet", seed=scene)
+        values = dict.fromkeys(RunRow._fields, "") | {
+            "id": number,
+            "detector": label.partition("[")[0],
+            "label": label,
+            "parameters_text": "{}",
+            "seed": seed,
+            "scene": recipe.name,
+            "recipe_text": json.dumps(recipe.to_dict()),
+            "scene_id": scene,
+            "status": status,
+            "cpu_seconds": 1.0,
+            "peak_memory": 10**8,
+            "detected": found,
+        }
+        self.rows.append(RunRow(**{**values, **costs}))
+        self.references.setdefault(scene, of)
+        if status == "ok" and of is not None:
+            self.evaluations[number] = KEYED.evaluator.evaluate(squares(found, shift), squares(of))
+        return self
+
+    def board(self, **options):
+        memory = Memory(self.evaluations, self.references)
+        return make_leaderboard(self.rows, memory, KEYED, title="t", **options)
+
+
+def ranks(board, pooling="pooled"):
+    return {entry.label: entry.rank for entry in board.entries if entry.pooling == pooling}
+
+
+def cell(board, label, key, pooling="pooled"):
+    return next(e for e in board.entries if (e.label, e.pooling) == (label, pooling)).cells[key]
+
+
+def test_the_better_detector_comes_first_whatever_its_direction():
+    runs = Runs()
+    for scene in (1, 2):
+        runs.add("far", scene, 9, shift=3.0).add("near", scene, 5, shift=0.5)
+    assert ranks(runs.board()) == {"far": 1, "near": 2}
+    assert ranks(runs.board(rank_by="geometric.rmse")) == {"near": 1, "far": 2}
+    assert ranks(runs.board(rank_by="RMSE")) == {"near": 1, "far": 2}
+
+
+def test_equal_detectors_share_a_rank_and_the_next_one_is_counted():
+    runs = Runs().add("a", 1, 8).add("b", 1, 8).add("c", 1, 5)
+    assert ranks(runs.board()) == {"a": 1, "b": 1, "c": 3}
+
+
+def test_an_undefined_value_and_a_missing_scene_have_no_rank():
+    runs = Runs().add("none", 1, 0).add("none", 2, 0).add("good", 1, 8).add("good", 2, 8)
+    runs.add("half", 1, 9).add("half", 2, status="failed", reason="no")
+    board = runs.board(rank_by="geometric.rmse")
+    assert ranks(board) == {"good": 1, "none": None, "half": None}
+    assert cell(board, "none", "geometric.rmse").value is None
+    assert "half has no rank: it has a result on 1 of 2 scenes" in board.notes
+
+
+def test_pooled_adds_objects_and_mean_averages_scenes():
+    runs = Runs().add("d", 1, 10, of=10).add("d", 2, 10, of=40)
+    board = runs.board()
+    assert cell(board, "d", "object.completeness").value == pytest.approx(20 / 50)
+    mean = cell(board, "d", "object.completeness", "mean")
+    assert (mean.value, mean.scenes) == (pytest.approx((1 + 0.25) / 2), 2)
+
+
+def test_seeds_are_averaged_before_scenes():
+    runs = Runs()
+    for seed, found in enumerate((10, 4)):
+        runs.add("d", 1, found, seed=seed)
+    runs.add("d", 2, 1, seed=0)
+    assert cell(runs.board(), "d", "object.completeness", "mean").value == pytest.approx((0.7 + 0.1) / 2)
+
+
+def test_a_mean_leaves_out_scenes_where_the_index_is_undefined():
+    board = Runs().add("d", 1, 10).add("d", 2, 0).board()
+    mean = cell(board, "d", "geometric.rmse", "mean")
+    assert (mean.scenes, mean.value) == (1, pytest.approx(cell(board, "d", "geometric.rmse").value))
+
+
+def test_intervals_hold_the_value_and_need_two_scenes():
+    runs = Runs()
+    for scene, found in enumerate((3, 5, 7, 9), start=1):
+        runs.add("d", scene, found)
+    for pooling in ("pooled", "mean"):
+        found = cell(runs.board(), "d", "object.completeness", pooling)
+        assert found.low < found.value < found.high
+    alone = cell(Runs().add("d", 1, 5).board(), "d", "object.completeness")
+    assert (alone.low, alone.high) == (None, None)
+
+
+def test_detectors_without_a_significant_difference_share_a_letter():
+    runs = Runs()
+    for scene, found in zip(range(1, 11), itertools.cycle((7, 8)), strict=False):
+        runs.add("good", scene, found).add("as good", scene, 15 - found).add("bad", scene, 2)
+    board = runs.board()
+    letters = {entry.label: entry.group for entry in board.entries}
+    assert letters["good"] == letters["as good"] != letters["bad"]
+    assert board.notes == (
+        "detectors that share a letter do not differ significantly in quality (paired tests over 10 scenes, Holm, "
+        "level 0.05)",
     )
 
 
-def entry(board, part, pooling="pooled"):
-    return next(entry for entry in board.entries if part in entry.label and entry.pooling == pooling)
+def test_too_few_scenes_for_tests_are_said_with_the_number_needed():
+    board = Runs().add("a", 1, 8).add("b", 1, 5).board()
+    assert board.notes == ("too few scenes for significance tests by quality: 1 paired tests need 6, 1 available",)
+    assert {entry.group for entry in board.entries} == {""}
 
 
-def test_better_detectors_come_first_and_incomplete_ones_have_no_rank(board):
-    assert [entry.rank for entry in board.entries] == [1, 1, 2, 2, None, None]
-    assert entry(board, "side=9").rank == 1
-    failing = entry(board, "raises")
-    assert (failing.scenes, failing.runs, failing.failed) == (2, 6, 2)
-    assert board.notes[0].startswith("groups are not told apart: 1 paired tests need 6 scenes")
-    assert board.notes[1:] == (
-        "misbehaving[mode=raises,only_on=hamlet-2] has no rank: it has a result on 2 of 3 scenes",
-    )
+def test_a_scene_without_reference_is_left_out():
+    board = Runs().add("d", 1, 8).add("d", 2, 3, of=None).board()
+    assert board.scenes == ("hamlet-1",)
+    assert board.notes == ("hamlet-2 has no reference and is left out",)
+    assert ranks(board) == {"d": 1}
 
 
-def test_pooled_adds_counts_and_mean_averages_scenes(board, path_of_plugin):
-    evaluations = []
-    for seed in (1, 2, 3):
-        scene = hamlet(seed)
-        for stream in (0, 1):
-            detected = rb.detect(scene, path_of_plugin, side=9, seed=stream)
-            evaluations.append(rb.evaluate(detected, scene.reference, grid=scene.image.grid))
-    pooled = rb.pool(evaluations)
-    cells = entry(board, "side=9").cells
-    for key in ("object.quality", "pixel.quality", "geometric.rmse"):
-        assert cells[key].value == pooled.values[key]
-    qualities = [evaluation.values["object.quality"] for evaluation in evaluations]
-    by_scene = [(one + two) / 2 for one, two in zip(qualities[::2], qualities[1::2], strict=True)]
-    assert entry(board, "side=9", "mean").cells["object.quality"].value == pytest.approx(sum(by_scene) / 3)
+def test_costs_are_the_median_time_and_the_highest_memory():
+    runs = Runs()
+    for scene, seconds in enumerate((1.0, 2.0, 9.0), start=1):
+        runs.add("d", scene, 5, cpu_seconds=seconds, peak_memory=int(seconds))
+    (entry,) = [entry for entry in runs.board().entries if entry.pooling == "mean"]
+    assert (entry.cpu_seconds, entry.peak_memory, entry.detected, entry.reference) == (2.0, 9, 15, 30)
 
 
-def test_markdown_names_what_the_figures_are_of(board):
-    text = board.to_markdown()
-    assert "3 scenes (hamlet-1, hamlet-2, hamlet-3); threshold-free (matching nearest" in text
-    assert "pooled" in text
-    assert "mean" in text
-    assert text.count("- failed: ") == 2
-    assert "ZeroDivisionError: no houses at all. Repeat: `roofbench detect " in text
-    header = next(line for line in text.splitlines() if line.startswith("|"))
-    assert [symbol for symbol in ("C_m %", "C_rr %", "Q_lp %", "M_f", "RMSE m") if symbol not in header] == []
+def test_failures_are_listed_before_skips_with_the_command_that_repeats_them():
+    runs = Runs().add("a[x=1]", 1, status="skipped", reason="no image", seed=2)
+    runs.add("b", 2, status="failed", reason="no roof")
+    first, second = unsuccessful_runs(runs.rows)
+    assert (first.label, first.reason) == ("b", "no roof")
+    assert (second.status, second.scene, second.seed) == ("skipped", "hamlet-1", 2)
+    assert second.command == repeat_command(runs.rows[0])
+    assert second.command == "roofbench detect 'a[x=1]' 'hamlet[seed=1]' --seed 2 -o out.gpkg"
+    assert runs.board().unsuccessful == (first, second)
 
 
-def test_csv_holds_fractions_and_over_how_many_scenes_they_are(board):
-    frame = board.to_frame()
-    row = frame[(frame["detector"] == "misbehaving") & (frame["pooling"] == "mean")].iloc[0]
-    assert 0 < row["object.quality"] < 1
-    assert row["object.quality:scenes"] == 3
-    assert board.to_csv().splitlines()[0].startswith("rank,group,detector,parameters,pooling,scenes")
-
-
-def test_ranking_by_an_unknown_index_names_the_nearest(path_of_plugin):
+def test_an_unknown_index_is_answered_with_the_nearest():
     with pytest.raises(UnknownNameError, match=r"did you mean 'pixel\.quality'"):
-        rb.run(scenes=["hamlet"], detectors=[path_of_plugin], index="pixel.qualty")
+        Runs().add("d", 1, 8).board(rank_by="pixel.qualty")

@@ -60,7 +60,7 @@ def test_limits_hold_on_a_cluster(suite, tmp_path, misbehaving):
         execution = Execution(scheduler=cluster.scheduler_address, limits=Limits(seconds=2))
         found = run(hanging, tmp_path / "a.sqlite", execution)
     close_isolated()
-    assert {reason for _, reason, *_ in found.values()} == {"time limit of 2 s passed"}
+    assert {reason for _, reason, *_ in found.values()} == {"time limit of 2 s exceeded"}
 
 
 @pytest.mark.slow

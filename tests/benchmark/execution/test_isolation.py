@@ -25,10 +25,10 @@ def call(process, task, **limits):
     ("mode", "reason"),
     [
         ("raises", "ZeroDivisionError: no houses at all"),
-        ("exits", "the worker process left the interpreter with exit code 7"),
-        ("leaves", "the worker process left the interpreter with exit code 9"),
+        ("exits", "the worker process exited with code 7"),
+        ("leaves", "the worker process exited with code 9"),
         ("crashes", "the worker process was killed by signal 11 (SIGSEGV)"),
-        ("hangs", "time limit of 1.5 s passed"),
+        ("hangs", "time limit of 1.5 s exceeded"),
         ("swallows", "out of memory: Unable to allocate 9.09 TiB for an array with shape (10000000000000,)"),
         ("nonsense", "misbehaving returned str, not Footprints: build them by Footprints.of"),
     ],
@@ -44,7 +44,7 @@ def test_a_run_that_eats_memory_is_stopped(process, task_of):
     outcome = call(process, task_of("eats"), memory=400_000_000)
     assert outcome.status == "failed"
     # The watcher or, when the machine is too busy for it, the bound on allocations is first.
-    assert outcome.reason.startswith(("memory limit of 400 MB passed: ", "out of memory"))
+    assert outcome.reason.startswith(("memory limit of 400 MB exceeded: ", "out of memory"))
     assert outcome.cost.peak_memory > 400_000_000
 
 
@@ -52,7 +52,7 @@ def test_a_run_that_eats_memory_is_stopped(process, task_of):
 def test_a_spike_between_two_looks_is_not_missed(process, task_of):
     outcome = call(process, task_of("spikes"), memory=400_000_000)
     assert outcome.status == "failed"
-    assert "memory limit of 400 MB passed: " in outcome.reason
+    assert "memory limit of 400 MB exceeded: " in outcome.reason
     assert call(process, task_of(), memory=400_000_000).status == "ok"
 
 

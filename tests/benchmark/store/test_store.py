@@ -124,7 +124,7 @@ def test_runs_are_found_by_number_key_and_pattern(store, outcome):
     assert [row.seed for row in store.runs(status="failed")] == [1]
     assert len(store.runs(detector="mis*", scene="hamlet-?")) == 2
     assert store.runs(scene="knox*") == []
-    with pytest.raises(UnknownNameError, match="no run called '99'"):
+    with pytest.raises(UnknownNameError, match="no run named '99'"):
         store.run(99)
 
 
