@@ -83,7 +83,6 @@ def evaluate(
     from ..core.errors import InputError, UnsupportedError
     from ..evaluators.registry import make_evaluator
     from ..reports.evaluation_text import format_evaluation
-    from ..scenes.folder import open_scene
     from ..scenes.geodata.vector_files import read_footprints, read_polygon
 
     chosen: dict[str, Any] = {"matching": matching, "area": area, "gsd": gsd, "minimum_area": minimum_area}
@@ -93,7 +92,11 @@ def evaluate(
     if building_id is not None and join_gaps is not None:
         raise InputError("blocks of joined footprints have no building ids: set building_id= or join_gaps=, not both")
     found = read_footprints(detected, crs=crs)
-    scene = open_scene(reference) if Path(reference).is_dir() else None
+    scene = None
+    if Path(reference).is_dir():
+        from ..scenes.folder import open_scene
+
+        scene = open_scene(reference)
     if scene is not None:
         if scene.reference is None:
             raise InputError(f"{reference}: the scene has no reference footprints: name a vector file")

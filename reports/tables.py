@@ -7,7 +7,6 @@ Tables for people hold numbers that `format` has turned into text; tables for pr
 from __future__ import annotations
 
 import csv
-import html
 import io
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -157,6 +156,7 @@ class Table:
 
     def to_html(self) -> str:
         """Return an HTML table for notebooks; everything in it is escaped."""
+        import html
 
         def line(tag: str, texts: Iterable[str]) -> str:
             cells = zip(texts, self.columns, strict=True)

@@ -52,7 +52,8 @@ def newest_runs(store: Store, *, detector: str | None = None, scene: str | None 
 def stored_evaluators(store: Store, rows: Sequence[RunRow]) -> list[KeyedEvaluator]:
     """Return the evaluators of these runs, the one with most evaluations first.
 
-    Of evaluators that differ in their code only, the one with most evaluations; those of missing plugins are left out.
+    Of evaluators that differ in their code only, the one with most evaluations, and the newest of those; those of
+    missing plugins are left out.
     """
     good = [row.id for row in rows if row.status == "ok"]
     found: dict[str, tuple[int, KeyedEvaluator]] = {}
@@ -62,7 +63,7 @@ def stored_evaluators(store: Store, rows: Sequence[RunRow]) -> list[KeyedEvaluat
         except RoofbenchError:
             continue
         count = len(store.evaluated(good, key))
-        if count > found.get(keyed.label, (0, keyed))[0]:
+        if count and count >= found.get(keyed.label, (0, keyed))[0]:
             found[keyed.label] = (count, keyed)
     return [keyed for _, keyed in sorted(found.values(), key=lambda pair: -pair[0])]
 

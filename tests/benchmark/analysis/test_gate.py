@@ -292,6 +292,18 @@ def test_every_default_index_exists():
     assert [index.key for index in INDICES] == list(EVALUATOR.gated_by)
 
 
+def test_a_baseline_of_version_0_1_is_compared_with_what_is_measured_now(cli):
+    path = Path(__file__).parents[2] / "data" / "baseline-0.1.json"
+    old = Baseline.load(path)
+    assert old.version.version == "0.1.0"
+    for values in old.detectors["ndsm"].runs.values():
+        assert {index.key for index in EVALUATOR.indices} == set(values)
+    result = cli("gate", str(path), "-j", 0)
+    assert result.exit_code == 4, "two scenes are too few for a conclusion"
+    assert result.stdout.count("not measurable") == 6
+    assert "completeness %" in result.stdout
+
+
 def test_run_time_is_compared_side_by_side(monkeypatch, tmp_path, misbehaving):
     from contextlib import nullcontext
 

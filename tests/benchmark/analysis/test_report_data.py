@@ -1,6 +1,8 @@
 """Reports filled from a store, and the commands that write them."""
 
 import re
+import shutil
+from pathlib import Path
 
 import pytest
 from harness.command_line import roofbench
@@ -36,6 +38,19 @@ def test_every_scene_is_drawn_with_picture_and_every_detector(filled):
                 len(footprints) for _, _, footprints in overlay.verdicts.sides
             ]
     assert filled.sampling == ()
+
+
+def test_a_store_of_version_0_1_is_reported_and_its_maps_come_back_by_scoring_it_again(tmp_path):
+    shutil.copy(Path(__file__).parents[2] / "data" / "store-0.1.db", tmp_path / "runs.sqlite")
+    with Store(tmp_path / "runs.sqlite") as opened:
+        old = fill_report(opened, newest_runs(opened), title="old")
+    assert old.boards[0].entries[0].cells["object.quality"].value == 22 / 31
+    assert old.scenes == ()
+    roofbench("score", "-e", "threshold-free", "--store", "runs.sqlite", folder=tmp_path)
+    with Store(tmp_path / "runs.sqlite") as opened:
+        new = fill_report(opened, newest_runs(opened), title="new")
+    assert new.boards[0].entries[0].cells["object.quality"].value == 22 / 31
+    assert new.scenes[0].overlays[0].verdicts.reference_table.count("FN") == 9
 
 
 def test_counts_by_size_are_those_of_the_leaderboard(filled):

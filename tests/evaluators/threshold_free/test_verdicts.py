@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 import shapely
+from builders.footprint_sets import random_detections, random_reference
+from naive.evaluation import centre, correspondence, outline_distance
 
 import roofbench as rb
+from roofbench.evaluators.threshold_free.object_graph import object_graph
+from roofbench.evaluators.threshold_free.verdicts import MEASURES, find_verdicts
 
 
 def verdicts(detected, reference, building=None, **more):
@@ -122,3 +126,33 @@ def test_one_pass_matching_leaves_a_reference_that_sweeping_finds():
     assert literal.verdicts.references.loc[1, "reason"] == (
         "missed: detection 1 overlaps it (25 %) but is booked on reference 0"
     )
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_verdicts_partners_and_measures_are_those_of_plain_loops(seed):
+    rng = np.random.default_rng(seed)
+    reference, building = random_reference(rng, general=True)
+    detected = random_detections(rng, reference)
+    graph = object_graph(rb.Footprints.of(detected), rb.Footprints.of(reference, building_ids=building))
+    rows = zip(*(side.tolist() for side in graph.correspondence.pairs), strict=True)
+    outline = np.array([outline_distance(detected[d], reference[r]) for d, r in rows])
+    found = find_verdicts(graph, outline)
+    matches, nearest = correspondence(detected, reference)
+    table = found.detection_table
+    for d in range(len(detected)):
+        expected = "TP" if d in matches else "MD" if d in nearest else "FP"
+        assert table.verdicts[d] == expected
+        partner = matches.get(d, nearest.get(d, -1))
+        assert table.partner[d] == partner
+        values = {measure.key: table.measures[measure.key][d] for measure in MEASURES}
+        if partner < 0:
+            assert np.isnan(list(values.values())).all()
+            continue
+        one, two = detected[d], reference[partner]
+        assert values["distance"] == pytest.approx(np.hypot(*np.subtract(centre(one), centre(two))), abs=1e-6)
+        assert values["overlap_area"] == pytest.approx(one.intersection(two).area, abs=1e-6)
+        assert values["iou"] == pytest.approx(one.intersection(two).area / one.union(two).area, abs=1e-6)
+        assert np.isnan(values["rmse"]) == (d not in matches)
+    missed = [r for r in range(len(reference)) if r not in matches.values()]
+    assert np.flatnonzero(found.reference_table.where("FN")).tolist() == missed
+    assert all(found.reference_table.reasons)
