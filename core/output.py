@@ -63,7 +63,7 @@ def check_folder(path: Path, overwrite: bool, *, holds: Sequence[str]) -> None:
 def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
     """Yield a temporary path with the same name; on success it (and its side files) replace `path`.
 
-    Side files are files that a driver writes beside the one it was told: ``.dbf``, ``.shx``, ``.aux.xml``.
+    Side files are files that a driver writes beside the requested one: ``.dbf``, ``.shx``, ``.aux.xml``.
     """
     target = Path(path)
     check_target(target, overwrite)

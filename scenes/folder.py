@@ -133,8 +133,8 @@ def read_manifest(path: str | os.PathLike[str]) -> tuple[Path, dict[str, Any]]:
     try:
         require_metric(manifest.get("crs"), str(file), remedy="write the CRS that its files are in")
     except CRSError as error:
-        told = str(error)
-        raise CRSError(told if told.startswith(str(file)) else f"{file}: {told}") from error
+        sentence = str(error)
+        raise CRSError(sentence if sentence.startswith(str(file)) else f"{file}: {sentence}") from error
     for kind in manifest.get("files", {}):
         if not (folder / FILES[kind]).is_file():
             raise InputError(

@@ -163,10 +163,10 @@ def _overlay_areas(
 ) -> NDArray[np.float64]:
     """Return the shared area of general polygons.
 
-    An overlay costs as much as the larger outline has vertices. One outline around a whole quarter would be paid for
-    at each of its houses, so it is cut into pieces first.
+    An overlay costs as much as the larger outline has vertices. An outline around a whole quarter would be
+    overlaid in full with each of its houses, so it is cut into pieces first.
     """
-    # Of all overlays that of an outline with itself is the dearest.
+    # Overlaying an outline with itself is the most expensive case.
     same = shapely.equals_exact(one[first], two[second], 0.0)
     areas = np.where(same, shapely.area(one[first]), 0.0)
     vertices = shapely.get_num_coordinates(one[first]), shapely.get_num_coordinates(two[second])

@@ -169,7 +169,7 @@ def read_points(
 
 @contextmanager
 def _written(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Tell in words that the compressor could not write: it names neither file nor reason."""
+    """Raise `OutputError` when LAZ compression fails; the library names neither file nor reason."""
     from lazrs import LazrsError
 
     try:

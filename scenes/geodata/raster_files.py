@@ -277,7 +277,7 @@ def opened(file: Path, *, opaque: bool = False) -> Iterator[Any]:
         raise InputError(f"{file}: no such file")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)  # told as an error by read_raster_header
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)  # reported as an error by read_raster_header
             source = rasterio.open(file)
         with source:
             if not opaque:

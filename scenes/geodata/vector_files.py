@@ -115,8 +115,8 @@ def read_footprints(
         require_metric(crs, str(file), heights=False)
     identifiers = _building_ids(file, columns, building_id)
     footprints = Footprints.of(geometries, building_ids=identifiers, crs=crs, attributes=columns, source=str(file))
-    told = {repair.id for repair in footprints.repairs}
-    more = [repair for repair in closed if repair.id not in told]
+    reported = {repair.id for repair in footprints.repairs}
+    more = [repair for repair in closed if repair.id not in reported]
     if more:
         repairs = sorted([*footprints.repairs, *more], key=lambda repair: repair.id)
         footprints = dataclasses.replace(footprints, repairs=tuple(repairs))
@@ -250,7 +250,7 @@ def _read_ogr(
 def _geometries(wkb: NDArray[np.object_]) -> tuple[NDArray[np.object_], list[Repair]]:
     """Return geometries of WKB; rings that end elsewhere than they began are closed and reported."""
     closed = []
-    with np.errstate(invalid="ignore"):  # coordinates that are NaN: left out and told by Footprints.of
+    with np.errstate(invalid="ignore"):  # coordinates that are NaN: left out and reported by Footprints.of
         geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
         unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
         for row in unread:
