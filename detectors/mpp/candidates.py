@@ -18,9 +18,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from .arrays import Heights, Integers, Labels, Mask, Rectangles
 from .patches import cells_of_patches, label_patches
 from .threads import ONE_THREAD, Threads
 
@@ -30,21 +30,21 @@ __all__ = ["propose_boxes"]
 _ANGLES = 30
 #: Largest rectangles taken from one patch.
 _PIECES = 12
-#: Cells of a rim that tell its direction.
+#: Fewest cells of a rim whose direction is used.
 _LEAST_RIM = 12
 #: A patch that fills this share of its bounding rectangle also gives that one: light wells and towers are holes in it.
 _FILLED = 0.85
 
 
 def propose_boxes(
-    height: NDArray[np.int32],
-    roof: NDArray[np.bool_] | NDArray[np.int32],
+    height: Heights,
+    roof: Mask | Labels,
     *,
     steps: tuple[float, ...],
     least_cells: int,
     threads: Threads = ONE_THREAD,
-) -> NDArray[np.float64]:
-    """Return boxes of the patches of several step limits, shape (n, 5), without doubles.
+) -> Rectangles:
+    """Return boxes of the patches of several step limits, shape (n, 5), without duplicates.
 
     Parameters
     ----------
@@ -72,18 +72,20 @@ def propose_boxes(
 
 
 def _boxes_of_patches(
-    labels: NDArray[np.int32], count: int, finer: NDArray[np.int32], least_cells: int, threads: Threads
-) -> list[NDArray[np.float64]]:
+    labels: Labels, count: int, finer: Labels, least_cells: int, threads: Threads
+) -> list[Rectangles]:
     cells, starts = cells_of_patches(labels, count, threads=threads)
 
-    def work(part: tuple[int, int]) -> NDArray[np.float64]:
+    def work(part: tuple[int, int]) -> Rectangles:
         return _boxes(cells, starts, *part, finer, least_cells, labels.shape)  # type: ignore[no-any-return]
 
     return threads.map(work, threads.ranges(np.diff(starts)))
 
 
 @kernel
-def _boxes(members, starts, first, last, finer, least_cells, shape):  # type: ignore[no-untyped-def]
+def _boxes(
+    members: Labels, starts: Integers, first: int, last: int, finer: Labels, least_cells: int, shape: tuple[int, int]
+) -> Rectangles:
     """Return the boxes of some patches but those that are also patches of `finer` labels, which had them already."""
     boxes = np.empty(((_PIECES + 1) * (last - first), 5))
     n = 0
@@ -97,7 +99,7 @@ def _boxes(members, starts, first, last, finer, least_cells, shape):  # type: ig
 
 
 @kernel
-def _is_patch(labels, cells):  # type: ignore[no-untyped-def]
+def _is_patch(labels: Labels, cells: Labels) -> bool:
     """Whether all cells have one label; a finer step only parts patches, so that this label has no other cells."""
     if len(labels) == 1:
         return False
@@ -109,7 +111,7 @@ def _is_patch(labels, cells):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _row_ends(cells):  # type: ignore[no-untyped-def]
+def _row_ends(cells: Labels) -> Labels:
     """Return the first and last cell of each row: no other lies farthest out in any direction."""
     ends = np.empty_like(cells)
     n = 0
@@ -121,7 +123,7 @@ def _row_ends(cells):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _bounding_area(cells, angle):  # type: ignore[no-untyped-def]
+def _bounding_area(cells: Labels, angle: float) -> float:
     """Area of the bounding rectangle at an angle."""
     cos, sin = math.cos(angle), math.sin(angle)
     low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
@@ -134,7 +136,7 @@ def _bounding_area(cells, angle):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _best_angle(cells):  # type: ignore[no-untyped-def]
+def _best_angle(cells: Labels) -> float:
     """Angle in a quarter turn at which the bounding rectangle is smallest, to an eighth of the first step."""
     best, best_angle = np.inf, 0.0
     for k in range(_ANGLES):
@@ -154,7 +156,7 @@ def _best_angle(cells):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _rim_inside(cells, shape):  # type: ignore[no-untyped-def]
+def _rim_inside(cells: Labels, shape: tuple[int, int]) -> Labels:
     """Return the first and last cells of the rows and columns of a patch but those at the border of the scene.
 
     None for a patch that does not reach the border.
@@ -187,7 +189,7 @@ def _rim_inside(cells, shape):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _wall_angle(rim):  # type: ignore[no-untyped-def]
+def _wall_angle(rim: Labels) -> float:
     """Angle in a quarter turn at which most cells of a rim lie on common lines along the axes."""
     reach = 0
     for i in range(len(rim)):
@@ -209,8 +211,8 @@ def _wall_angle(rim):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _take_apart(cells, angle, least_cells, boxes, n):  # type: ignore[no-untyped-def]
-    """Append the bounding and the largest filled rectangles of a patch at an angle, until what is left is small."""
+def _take_apart(cells: Labels, angle: float, least_cells: int, boxes: Rectangles, n: int) -> int:
+    """Append the bounding and the largest filled rectangles of a patch at an angle, until the rest is small."""
     cos, sin = math.cos(angle), math.sin(angle)
     low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
     for i in range(len(cells)):
@@ -247,7 +249,7 @@ def _take_apart(cells, angle, least_cells, boxes, n):  # type: ignore[no-untyped
 
 
 @kernel
-def _largest_filled(full):  # type: ignore[no-untyped-def]
+def _largest_filled(full: Mask) -> tuple[int, int, int, int, int]:
     """Area, top, left, bottom, right of the largest rectangle of true cells (histogram of runs, one stack per row)."""
     rows, columns = full.shape
     run = np.zeros(columns + 1, dtype=np.int64)

@@ -22,7 +22,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +34,7 @@ from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
 from ...scenes.geodata.sampling import bilinear_at
+from .arrays import Floats, Heights, Labels, States
 from .threads import ONE_THREAD, Threads
 
 __all__ = ["FEWEST_POINTS", "HIGH", "LOW", "VOID", "Cells", "cell_size", "has_points", "make_cells"]
@@ -43,7 +46,8 @@ FEWEST_POINTS = 20
 
 #: Points higher above ground than this many metres are birds and clouds (the tallest building of 2025 has 828 m).
 _SKY = 900.0
-_ASTRAY = -(1 << 30)
+#: Height of a point that does not count.
+_OUTLIER = -(1 << 30)
 #: Points this many centimetres below the highest of a cell still belong to its top.
 _NEAR_TOP = 75
 #: A height that differs by more than this many centimetres from all its neighbours is a spike.
@@ -66,19 +70,17 @@ class Cells:
     """
 
     grid: Grid
-    height: NDArray[np.int32]
-    state: NDArray[np.uint8]
-    openness: NDArray[np.uint8]
+    height: Heights
+    state: States
+    openness: States
 
 
-def has_points(z: NDArray[np.float64]) -> bool:
+def has_points(z: Floats) -> bool:
     """Return whether a scene has enough finite elevations; the first ones are looked at first."""
     return any(np.count_nonzero(np.isfinite(part)) >= FEWEST_POINTS for part in (z[: 100 * FEWEST_POINTS], z))
 
 
-def cell_size(
-    x: NDArray[np.float64], y: NDArray[np.float64], extent: Sequence[float], *, threads: Threads = ONE_THREAD
-) -> float:
+def cell_size(x: Floats, y: Floats, extent: Sequence[float], *, threads: Threads = ONE_THREAD) -> float:
     """Return the cell size in metres for a mean point spacing: 0.5 to 2 m in steps of 0.25.
 
     Half the spacing and 0.2 m, rounded up: at 3 points per m2 0.5 m, at 1 point 0.75 m. Cells that no point falls into
@@ -115,24 +117,23 @@ def make_cells(
     threads : Threads
     """
     size = grid.rows * grid.columns
-    counts, tops = np.empty((size, 4), dtype=np.int32), np.empty((size, 2), dtype=np.int32)
+    counts, tops = np.empty((size, len(_Count)), dtype=np.int32), np.empty((size, 2), dtype=np.int32)
     returns = points.number_of_returns
     if returns is None:
         returns = np.empty(0, dtype=np.uint8)
     elevation = np.ascontiguousarray(ground.values, dtype=np.float32)
     place = (ground.grid.west, ground.grid.north, ground.grid.gsd)
-    frame = (grid.west, grid.north, grid.gsd)
-    cloud = (points.x, points.y, points.z)
+    cloud = _Cloud(points.x, points.y, points.z, returns, elevation, place)
     lowest = math.floor(100 * low)
-
     height, state = np.empty(grid.shape, dtype=np.int32), np.empty(grid.shape, dtype=np.uint8)
     openness, other = np.empty_like(state), np.empty_like(state)
 
     def work(first: int, last: int) -> None:
-        mine = slice(first * grid.columns, last * grid.columns)
-        counts[mine], tops[mine] = 0, 0
-        _count(*cloud, returns, elevation, place, frame, first, last, grid.columns, lowest, counts)
-        _add_tops(*cloud, elevation, place, frame, first, last, grid.columns, counts, tops)
+        own = slice(first * grid.columns, last * grid.columns)
+        counts[own], tops[own] = 0, 0
+        band = _Band(grid.west, grid.north, grid.gsd, first, last, grid.columns)
+        _count(cloud, band, lowest, counts)
+        _add_tops(cloud, band, counts, tops)
         _summarise(counts, tops, first, last, height, state, openness)
 
     # Every band goes through all points: no more bands than threads.
@@ -143,69 +144,101 @@ def make_cells(
     return Cells(grid, height, other, openness)
 
 
-@kernel(inline="always")
-def _cell_of(x, y, frame, first, last, columns):  # type: ignore[no-untyped-def]
-    """Return the flat cell of a place, -1 outside rows first..last and outside the columns."""
-    west, north, cell = frame
-    # Other threads' points are passed over before anything is divided.
-    if not ((first - 1) * cell < north - y < (last + 1) * cell):
-        return -1
-    row, column = (north - y) / cell, (x - west) / cell
-    if not (first <= row < last and 0 <= column < columns):
-        return -1
-    return int(row) * columns + int(column)
+class _Cloud(NamedTuple):
+    """Points, and the bare earth under them; `returns` is empty where the number of returns is not known."""
+
+    x: Floats
+    y: Floats
+    z: Floats
+    returns: NDArray[np.uint8]
+    ground: NDArray[np.float32]
+    place: tuple[float, float, float]
+
+
+class _Band(NamedTuple):
+    """Rows first to last of the working grid; west, north and cell in metres."""
+
+    west: float
+    north: float
+    cell: float
+    first: int
+    last: int
+    columns: int
+
+
+class _Count(IntEnum):
+    """Columns of what is counted in a cell."""
+
+    POINTS = 0
+    HIGH_POINTS = 1
+    MULTIPLE = 2
+    TOP = 3
 
 
 @kernel(inline="always")
-def _above(x, y, z, ground, place):  # type: ignore[no-untyped-def]
-    """Return the height above ground in centimetres, `_ASTRAY` where there is none or it is in the sky."""
-    west, north, cell = place
-    h = z - bilinear_at(ground, west, north, cell, x, y)
-    return math.floor(h * 100.0 + 0.5) if -_SKY < h < _SKY else _ASTRAY
+def _cell_of(x: float, y: float, band: _Band) -> int:
+    """Return the flat cell of a place, -1 outside the band."""
+    # The points of other threads are passed over before anything is divided.
+    if not ((band.first - 1) * band.cell < band.north - y < (band.last + 1) * band.cell):
+        return -1
+    row, column = (band.north - y) / band.cell, (x - band.west) / band.cell
+    if not (band.first <= row < band.last and 0 <= column < band.columns):
+        return -1
+    return int(row) * band.columns + int(column)
+
+
+@kernel(inline="always")
+def _above(cloud: _Cloud, i: int) -> int:
+    """Return the height of a point above ground in centimetres, `_OUTLIER` where there is none or it is in the sky."""
+    west, north, cell = cloud.place
+    h = cloud.z[i] - bilinear_at(cloud.ground, west, north, cell, cloud.x[i], cloud.y[i])
+    return math.floor(h * 100.0 + 0.5) if -_SKY < h < _SKY else _OUTLIER
 
 
 @kernel
-def _count(x, y, z, returns, ground, place, frame, first, last, columns, low, counts):  # type: ignore[no-untyped-def]
-    """Count all points, high ones and parts of multiple returns per cell, and find the top: columns 0 to 3."""
-    for i in range(len(x)):
-        k = _cell_of(x[i], y[i], frame, first, last, columns)
+def _count(cloud: _Cloud, band: _Band, low: int, counts: Labels) -> None:
+    """Count all points, high ones and parts of multiple returns per cell, and find the top."""
+    for i in range(len(cloud.x)):
+        k = _cell_of(cloud.x[i], cloud.y[i], band)
         if k < 0:
             continue
-        height = _above(x[i], y[i], z[i], ground, place)
-        if height == _ASTRAY:
+        height = _above(cloud, i)
+        if height == _OUTLIER:
             continue
-        counts[k, 0] += 1
+        counts[k, _Count.POINTS] += 1
         if height > low:
-            counts[k, 1] += 1
-            counts[k, 3] = max(counts[k, 3], height)
-        if len(returns) > 0 and returns[i] > 1:
-            counts[k, 2] += 1
+            counts[k, _Count.HIGH_POINTS] += 1
+            counts[k, _Count.TOP] = max(counts[k, _Count.TOP], height)
+        if len(cloud.returns) > 0 and cloud.returns[i] > 1:
+            counts[k, _Count.MULTIPLE] += 1
 
 
 @kernel
-def _add_tops(x, y, z, ground, place, frame, first, last, columns, counts, tops):  # type: ignore[no-untyped-def]
-    """Count and sum up the points near the top of their cell.
+def _add_tops(cloud: _Cloud, band: _Band, counts: Labels, tops: Labels) -> None:
+    """Fill number and sum of the heights of the points near the top of their cell, tops of shape (cells, 2).
 
     Heights are computed a second time, since keeping them would take more memory than all else in a dense cloud.
     """
-    for i in range(len(x)):
-        k = _cell_of(x[i], y[i], frame, first, last, columns)
-        if k < 0 or 2 * counts[k, 1] <= counts[k, 0]:
+    for i in range(len(cloud.x)):
+        k = _cell_of(cloud.x[i], cloud.y[i], band)
+        if k < 0 or 2 * counts[k, _Count.HIGH_POINTS] <= counts[k, _Count.POINTS]:
             continue
-        height = _above(x[i], y[i], z[i], ground, place)
-        if height != _ASTRAY and height >= counts[k, 3] - _NEAR_TOP:
+        height = _above(cloud, i)
+        if height != _OUTLIER and height >= counts[k, _Count.TOP] - _NEAR_TOP:
             tops[k, 0] += 1
             tops[k, 1] += height
 
 
 @kernel
-def _summarise(counts, tops, first, last, height, state, openness):  # type: ignore[no-untyped-def]
+def _summarise(
+    counts: Labels, tops: Labels, first: int, last: int, height: Heights, state: States, openness: States
+) -> None:
     """Fill height, state and openness of some rows from what was counted."""
     columns = state.shape[1]
     for r in range(first, last):
         for c in range(columns):
             k = r * columns + c
-            n, high, many = counts[k, 0], counts[k, 1], counts[k, 2]
+            n, high, many = counts[k, _Count.POINTS], counts[k, _Count.HIGH_POINTS], counts[k, _Count.MULTIPLE]
             height[r, c], openness[r, c] = 0, 0
             if n == 0:
                 state[r, c] = VOID
@@ -218,8 +251,8 @@ def _summarise(counts, tops, first, last, height, state, openness):  # type: ign
 
 
 @kernel
-def _despike(height, before, first, last, state):  # type: ignore[no-untyped-def]
-    """Fill the states of some rows, in which high cells are void whose height no neighbour shares to 2 m.
+def _despike(height: Heights, before: States, first: int, last: int, state: States) -> None:
+    """Fill the states of some rows; high cells become void where no neighbour has their height to 2 m.
 
     Birds, masts, chimneys and errors of the sensor are such cells.
     """
@@ -242,10 +275,10 @@ def _despike(height, before, first, last, state):  # type: ignore[no-untyped-def
 
 
 @kernel
-def _fill(height, openness, before, first, last, state):  # type: ignore[no-untyped-def]
-    """Fill the states of some rows, in which void cells have that of most neighbours where three at least are known.
+def _fill(height: Heights, openness: States, before: States, first: int, last: int, state: States) -> None:
+    """Fill the states of some rows; void cells take the state of most neighbours where at least three are known.
 
-    Their height and openness are set to go with it.
+    Their height and openness become the means of those neighbours.
     """
     rows, columns = state.shape
     for r in range(first, last):

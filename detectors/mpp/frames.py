@@ -23,14 +23,16 @@ lowered to the plane of its base, as other superstructures are: one building has
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from .arrays import Heights, Integers, Labels, Mask, Rectangles, States
 from .cells import HIGH, LOW, VOID
 from .patches import patch_sizes
 from .rectangles import overlap_area, row_span
+from .reshaping import move_edge
 from .threads import ONE_THREAD, Threads
 
 __all__ = ["lower_storeys"]
@@ -48,15 +50,55 @@ _SQUARE = 16
 _LEVEL, _LOWER, _SMOOTH = 0.6, 0.2, 0.8
 #: Share of a side's cells with which a storey reaches it, and share of a storey's cells that lie inside the box.
 _REACHED, _INSIDE = 0.2, 0.85
+#: Sides of the border are 0 to 3; cells within the border, and cells at the very edge of the box.
+_CORE, _EDGE = 4, 5
+#: Fewest cells of roof in a border that has a base, and fewest sides that lie at it.
+_FEWEST_CELLS, _FEWEST_SIDES = 8, 3
+#: Cells by which the side of a box moves out at a time.
+_STRIP = 0.5
+
+
+class _Surface(NamedTuple):
+    """What the boxes are compared with.
+
+    Attributes
+    ----------
+    height : ndarray of int32, shape (rows, columns)
+        Centimetres; lowered in place.
+    state : ndarray of uint8, shape (rows, columns)
+        Changed in place where storeys are lowered.
+    roofs : ndarray of int32, shape (rows, columns)
+        Centimetres before anything is lowered, walls at the height of the roof beside them.
+    labels : ndarray of int32, shape (rows, columns)
+        Patches, 0 elsewhere.
+    sizes : ndarray of int64, shape (count + 1,)
+        Cells of each patch.
+    step : int
+        Centimetres.
+    """
+
+    height: Heights
+    state: States
+    roofs: Heights
+    labels: Labels
+    sizes: Integers
+    step: int
+
+
+class _Storeys(NamedTuple):
+    """Which patches are storeys: `marked` of those with the labels from `least` on."""
+
+    marked: Mask
+    least: int
 
 
 def lower_storeys(
-    height: NDArray[np.int32],
-    state: NDArray[np.uint8],
-    roofs: NDArray[np.int32],
-    labels: NDArray[np.int32],
+    height: Heights,
+    state: States,
+    roofs: Heights,
+    labels: Labels,
     count: int,
-    boxes: NDArray[np.float64],
+    boxes: Rectangles,
     step: int,
     *,
     threads: Threads = ONE_THREAD,
@@ -81,19 +123,19 @@ def lower_storeys(
         Centimetres.
     threads : Threads
     """
-    sizes = patch_sizes(labels, count, threads=threads)
+    surface = _Surface(height, state, roofs, labels, patch_sizes(labels, count, threads=threads), step)
     wave = np.zeros(len(boxes), dtype=np.int64) if threads.count == 1 else _waves(boxes, *height.shape)
     for turn in range(wave.max(initial=-1) + 1):
         batch = boxes[wave == turn]
 
-        def work(part: tuple[int, int], batch: NDArray[np.float64] = batch) -> None:
-            _lower_boxes(height, state, roofs, labels, sizes, batch[slice(*part)], step)
+        def work(part: tuple[int, int], batch: Rectangles = batch) -> None:
+            _lower_boxes(surface, batch[slice(*part)])
 
         threads.map(work, threads.ranges(batch[:, 2] * batch[:, 3], each=2))
 
 
 @kernel
-def _waves(boxes, rows, columns):  # type: ignore[no-untyped-def]
+def _waves(boxes: Rectangles, rows: int, columns: int) -> Integers:
     """Return the wave of each box: the first after those of all boxes before it that it may share a cell with."""
     wave = np.zeros(len(boxes), dtype=np.int64)
     grown = boxes.copy()
@@ -126,55 +168,60 @@ def _waves(boxes, rows, columns):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def _square(place, size):  # type: ignore[no-untyped-def]
+def _square(place: float, size: int) -> int:
     """Return the square of the grid along one axis that a place lies in, the nearest one outside."""
     return int(min(max(place, 0.0), size - 1.0)) // _SQUARE
 
 
 @kernel
-def _lower_boxes(height, state, roofs, labels, sizes, boxes, step):  # type: ignore[no-untyped-def]
+def _lower_boxes(surface: _Surface, boxes: Rectangles) -> None:
+    """Lower the storeys of some boxes, in place."""
     for k in range(len(boxes)):
         box = boxes[k].copy()
-        _grow(height, state, box, step)
-        _lower_one(height, state, roofs, labels, sizes, box, step)
+        _grow(surface, box)
+        _lower_one(surface, box)
 
 
 @kernel
-def _grow(height, state, box, step):  # type: ignore[no-untyped-def]
+def _cell_at(box: Rectangles, u: float, v: float) -> tuple[int, int]:
+    """Return row and column of the cell at u, v from the centre of a box."""
+    cos, sin = math.cos(box[4]), math.sin(box[4])
+    return math.floor(box[1] + u * sin + v * cos), math.floor(box[0] + u * cos - v * sin)
+
+
+@kernel
+def _grow(surface: _Surface, box: Rectangles) -> None:
     """Move the sides of a box out over strips of half a cell that are mostly high, in place, but not up a step.
 
     A box of cells that are all high stops short of the ragged edge of a roof that is turned against the grid.
     """
+    height, state = surface.height, surface.state
     rows, columns = state.shape
-    cos, sin = math.cos(box[4]), math.sin(box[4])
     for side in range(4):
         axis, end = side // 2, 1.0 if side % 2 == 0 else -1.0
         for _ in range(_GROWTH):
             along = box[3 - axis]
             many = max(int(along), 1)
             high, unknown = 0, 0
-            out = end * (0.5 * box[2 + axis] + 0.25)
+            out = end * (0.5 * box[2 + axis] + 0.5 * _STRIP)
             for k in range(many):
                 at = ((k + 0.5) / many - 0.5) * along
-                u, v = (out, at) if axis == 0 else (at, out)
-                c, r = math.floor(box[0] + u * cos - v * sin), math.floor(box[1] + u * sin + v * cos)
+                r, c = _cell_at(box, out if axis == 0 else at, at if axis == 0 else out)
                 if 0 <= r < rows and 0 <= c < columns:
-                    u, v = (out - end * _BORDER, at) if axis == 0 else (at, out - end * _BORDER)
-                    j, i = math.floor(box[0] + u * cos - v * sin), math.floor(box[1] + u * sin + v * cos)
+                    back = out - end * _BORDER
+                    i, j = _cell_at(box, back if axis == 0 else at, at if axis == 0 else back)
                     inner = 0 <= i < rows and 0 <= j < columns and state[i, j] == HIGH
-                    level = not inner or height[r, c] <= height[i, j] + step
+                    level = not inner or height[r, c] <= height[i, j] + surface.step
                     high += state[r, c] == HIGH and level
                     unknown += state[r, c] == VOID
             if high < _LEVEL * (many - unknown) or 3 * high < many:
                 break
-            box[2 + axis] += 0.5
-            box[0] += 0.25 * end * (cos if axis == 0 else -sin)
-            box[1] += 0.25 * end * (sin if axis == 0 else cos)
+            move_edge(box, side, _STRIP, box)
 
 
 @kernel
-def _cells_of(box, shape, inner):  # type: ignore[no-untyped-def]
-    """Return row, column and side of the border (4: within it, 5: at its very edge) of the cells of a box.
+def _cells_of(box: Rectangles, shape: tuple[int, int], inner: bool) -> Labels:
+    """Return row, column and side of the border, `_CORE` or `_EDGE` of the cells of a box.
 
     Without `inner` those within the border are left out.
     """
@@ -198,20 +245,20 @@ def _cells_of(box, shape, inner):  # type: ignore[no-untyped-def]
         if core_a > 0 and core_b > 0:
             lo, hi = row_span(dy, core_a, core_b, cos, sin)
             if lo + 4.0 < hi:
-                # Cells that rounding might put on either side of the core's are looked at.
+                # Cells that rounding might put on either side of the core's edge are examined.
                 left = max(min(int(cx + lo + 2.0), last), first)
                 right = max(min(int(cx + hi - 1.0), last), left)
-        n = _look(members, n, box, r, first, left, inner)
+        n = _append(members, n, box, r, first, left, inner)
         if inner:
             for c in range(left, min(right, left + len(members) - n)):
-                members[n, 0], members[n, 1], members[n, 2] = r, c, 4
+                members[n, 0], members[n, 1], members[n, 2] = r, c, _CORE
                 n += 1
-        n = _look(members, n, box, r, right, last, inner)
+        n = _append(members, n, box, r, right, last, inner)
     return members[:n]
 
 
 @kernel(inline="always")
-def _look(members, n, box, r, first, last, inner):  # type: ignore[no-untyped-def]
+def _append(members: Labels, n: int, box: Rectangles, r: int, first: int, last: int, inner: bool) -> int:
     """Append the cells of a part of a row, as `_cells_of` does; return how many there are now."""
     cos, sin = math.cos(box[4]), math.sin(box[4])
     dy = r + 0.5 - box[1]
@@ -223,113 +270,124 @@ def _look(members, n, box, r, first, last, inner):  # type: ignore[no-untyped-de
         if inner or away < _BORDER:
             side = (1 if u > 0 else 0) if away_u < away_v else (3 if v > 0 else 2)
             members[n, 0], members[n, 1] = r, c
-            members[n, 2] = 5 if away < 0.5 else (side if away < _BORDER else 4)
+            members[n, 2] = _EDGE if away < 0.5 else (side if away < _BORDER else _CORE)
             n += 1
     return n
 
 
 @kernel
-def _base_of(height, state, labels, box, step, known):  # type: ignore[no-untyped-def]
-    """Return the base of a box, -1 where it has none or less than three sides lie at it; fill the known cells a side.
+def _base_of(surface: _Surface, box: Rectangles, known: Integers) -> int:
+    """Return the base of a box, -1 where it has none or too few sides lie at it; fill the known cells per side.
 
-    Most boxes are told from frames here, by their border alone.
+    Most boxes are recognised as no frames here, by their border alone.
     """
+    height, state, labels, step = surface.height, surface.state, surface.labels, surface.step
     cells = _cells_of(box, height.shape, False)
     border = np.empty(len(cells), dtype=np.int32)
     n = 0
     for i in range(len(cells)):
         r, c, side = cells[i, 0], cells[i, 1], cells[i, 2]
-        if side < 4 and labels[r, c] > 0:
+        if side < _CORE and labels[r, c] > 0:
             border[n] = height[r, c]
             n += 1
-        if side < 4 and state[r, c] != VOID:
+        if side < _CORE and state[r, c] != VOID:
             known[side] += 1
-    if n < 8:
+    if n < _FEWEST_CELLS:
         return -1
-    base = np.int64(np.partition(border[:n], n // 2)[n // 2])
-    level, taken = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
+    base = int(np.partition(border[:n], n // 2)[n // 2])
+    level, higher = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
     for i in range(len(cells)):
         r, c, side = cells[i, 0], cells[i, 1], cells[i, 2]
-        if side < 4 and state[r, c] != VOID:
+        if side < _CORE and state[r, c] != VOID:
             above = _rise(height, state, r, c, base)
             if abs(above) <= step:
                 level[side] += 1
             elif above > step and labels[r, c] > 0:
-                taken[side] += 1
+                higher[side] += 1
     sides = 0
     for side in range(4):
-        if level[side] >= _LEVEL * max(level[side] + taken[side], known[side] // 2) and level[side] > 0:
+        if level[side] >= _LEVEL * max(level[side] + higher[side], known[side] // 2) and level[side] > 0:
             sides += 1
-    return base if sides >= 3 else -1
+    return base if sides >= _FEWEST_SIDES else -1
 
 
 @kernel(inline="always")
-def _rise(height, state, r, c, base):  # type: ignore[no-untyped-def]
+def _rise(height: Heights, state: States, r: int, c: int, base: int) -> int:
     """Return how high a cell lies above the base, centimetres."""
     return height[r, c] - base if state[r, c] == HIGH else -base
 
 
 @kernel
-def _lower_one(height, state, roofs, labels, sizes, box, step):  # type: ignore[no-untyped-def]
+def _lower_one(surface: _Surface, box: Rectangles) -> None:
+    """Lower the storeys of one box, in place, if it is a frame."""
     known = np.zeros(4, dtype=np.int64)
-    base = _base_of(height, state, labels, box, step, known)
+    base = _base_of(surface, box, known)
     if base < 0:
         return
-    cells = _cells_of(box, height.shape, True)
+    cells = _cells_of(box, surface.height.shape, True)
     lower, higher, all_known, smooth = 0, 0, 0, 0
-    least, most = len(sizes), 0
+    least, most = len(surface.sizes), 0
     for i in range(len(cells)):
         r, c = cells[i, 0], cells[i, 1]
-        label = labels[r, c]
+        label = surface.labels[r, c]
         if label > 0:
             least, most = min(least, label), max(most, label)
-        if cells[i, 2] < 5 and state[r, c] != VOID:
+        if cells[i, 2] != _EDGE and surface.state[r, c] != VOID:
             all_known += 1
             smooth += label > 0
-            above = _rise(height, state, r, c, base)
-            lower += above < -step
-            higher += above > step
+            above = _rise(surface.height, surface.state, r, c, base)
+            lower += above < -surface.step
+            higher += above > surface.step
     if higher == 0 or lower > _LOWER * all_known or smooth < _SMOOTH * all_known:
         return
-    inside, rise = np.zeros(most - least + 1, dtype=np.int64), np.zeros(most - least + 1, dtype=np.int64)
-    reached = np.zeros((most - least + 1, 4), dtype=np.int64)
+    # Storeys are marked first: their cells are lowered to the plane of what is none.
+    storeys = _Storeys(np.zeros(most - least + 1, dtype=np.bool_), least)
+    _mark_storeys(surface, cells, known, base, storeys)
+    if storeys.marked.any():
+        _keep_carried(surface, cells, base, storeys)
+    if storeys.marked.any():
+        _flatten(surface, cells, base, storeys, box)
+
+
+@kernel
+def _mark_storeys(surface: _Surface, cells: Labels, known: Integers, base: int, storeys: _Storeys) -> None:
+    """Mark the patches that lie inside a box, above its base, and reach its border on one side at most."""
+    count, least = len(storeys.marked), storeys.least
+    inside, rise = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    reached = np.zeros((count, 4), dtype=np.int64)
     for i in range(len(cells)):
         r, c, side = cells[i, 0], cells[i, 1], cells[i, 2]
-        label = labels[r, c]
+        label = surface.labels[r, c]
         if label > 0:
             inside[label - least] += 1
-            rise[label - least] += height[r, c]
-            if side < 4:
+            rise[label - least] += surface.height[r, c]
+            if side < _CORE:
                 reached[label - least, side] += 1
-    # Storeys are marked first: their cells are lowered to the plane of what is none.
-    storey = np.zeros(most - least + 1, dtype=np.bool_)
-    for patch in range(most - least + 1):
+    for patch in range(count):
         many = inside[patch]
-        if many == 0 or many < _INSIDE * sizes[least + patch] or rise[patch] <= (base + step) * many:
+        low = rise[patch] <= (base + surface.step) * many
+        if many == 0 or many < _INSIDE * surface.sizes[least + patch] or low:
             continue
         contacts = 0
         for side in range(4):
             if reached[patch, side] > _REACHED * known[side]:
                 contacts += 1
-        storey[patch] = contacts <= 1
-    if storey.any():
-        _keep_carried(roofs, labels, cells, base, step, storey, least)
-    if storey.any():
-        _flatten(height, state, labels, cells, base, step, storey, least, box)
+        storeys.marked[patch] = contacts <= 1
 
 
 @kernel
-def _keep_carried(roofs, labels, cells, base, step, storey, least):  # type: ignore[no-untyped-def]
+def _keep_carried(surface: _Surface, cells: Labels, base: int, storeys: _Storeys) -> None:
     """Unmark storeys that stand on a roof of another level than the base, in place.
 
     The penthouse of a tower beside the box may lie in it as well, but is carried by its tower.
     """
+    roofs, labels, marked, least = surface.roofs, surface.labels, storeys.marked, storeys.least
     rows, columns = roofs.shape
-    balance = np.zeros(len(storey), dtype=np.int64)
+    balance = np.zeros(len(marked), dtype=np.int64)
     for i in range(len(cells)):
         r, c = cells[i, 0], cells[i, 1]
         patch = labels[r, c] - least
-        if patch < 0 or not storey[patch]:
+        if patch < 0 or not marked[patch]:
             continue
         for side in range(4):
             j = r + (1 if side == 0 else (-1 if side == 1 else 0))
@@ -337,19 +395,21 @@ def _keep_carried(roofs, labels, cells, base, step, storey, least):  # type: ign
             if not (0 <= j < rows and 0 <= k < columns) or labels[j, k] == 0 or roofs[j, k] >= roofs[r, c]:
                 continue
             other = labels[j, k] - least
-            if not (0 <= other < len(storey) and storey[other]):
-                balance[patch] += 1 if abs(roofs[j, k] - base) <= step else -1
-    for patch in range(len(storey)):
-        storey[patch] = storey[patch] and balance[patch] >= 0
+            if not (0 <= other < len(marked) and marked[other]):
+                balance[patch] += 1 if abs(roofs[j, k] - base) <= surface.step else -1
+    for patch in range(len(marked)):
+        marked[patch] = marked[patch] and balance[patch] >= 0
 
 
 @kernel
-def _flatten(height, state, labels, cells, base, step, storey, least, box):  # type: ignore[no-untyped-def]
-    """Lower storeys, and walls and furniture above the base, to the plane of the base."""
+def _flatten(surface: _Surface, cells: Labels, base: int, storeys: _Storeys, box: Rectangles) -> None:
+    """Lower storeys, and walls and roof structures above the base, to the plane of the base, in place."""
+    height, state, labels, step = surface.height, surface.state, surface.labels, surface.step
     n, x, y, xx, xy, yy, h, xh, yh = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(cells)):
         r, c = cells[i, 0], cells[i, 1]
-        if labels[r, c] > 0 and not storey[labels[r, c] - least] and abs(height[r, c] - base) <= step:
+        label = labels[r, c]
+        if label > 0 and not storeys.marked[label - storeys.least] and abs(height[r, c] - base) <= step:
             dx, dy, rise = c + 0.5 - box[0], r + 0.5 - box[1], height[r, c] - base
             n += 1.0
             x += dx
@@ -364,9 +424,10 @@ def _flatten(height, state, labels, cells, base, step, storey, least, box):  # t
     plane = np.linalg.solve(normal, np.array([h, xh, yh]))
     for i in range(len(cells)):
         r, c = cells[i, 0], cells[i, 1]
-        if state[r, c] == LOW or (cells[i, 2] == 5 and state[r, c] != HIGH):
+        if state[r, c] == LOW or (cells[i, 2] == _EDGE and state[r, c] != HIGH):
             continue
-        if labels[r, c] == 0 or (storey[labels[r, c] - least] and height[r, c] > base + step):
+        label = labels[r, c]
+        if label == 0 or (storeys.marked[label - storeys.least] and height[r, c] > base + step):
             level = base + plane[0] + plane[1] * (c + 0.5 - box[0]) + plane[2] * (r + 0.5 - box[1])
             height[r, c] = min(max(round(level), base - step), base + step)
             state[r, c] = HIGH

@@ -20,7 +20,6 @@ from ...scenes.scene import Scene
 from ..base import Detector
 from ..steps import Step
 from .arrays import Mask, Rectangles
-from .background import mean_evidence
 from .cells import has_points
 from .city import join_traces, sample_city, total_energy
 from .energy import rectangle_energies
@@ -28,7 +27,8 @@ from .memory import release_memory
 from .mpp_steps import mpp_steps
 from .outcome import as_blocks, as_buildings, fit_roofs
 from .parameters import MPPParameters
-from .preparation import Prepared, prepare
+from .preparation import Prepared, prepare, weights_of
+from .scores import mean_evidence
 from .tables import NO_TABLES
 from .threads import started_threads
 
@@ -85,14 +85,10 @@ class MPP(MPPParameters, Detector):
         least = self.least_evidence * self.texture_limit * min(self.texture_weight, 1.0)
         if least == 0:
             return np.ones(len(rectangles), dtype=np.bool_)
-        return least <= mean_evidence(
-            rectangles,
-            prepared.height,
-            prepared.state,
-            prepared.score,
-            prepared.background,
-            fit_weight=self.fit_weight,
+        evidence = mean_evidence(
+            rectangles, prepared.height, prepared.state, prepared.score, prepared.background, weights_of(self)
         )
+        return least <= evidence
 
     def _run(self, scene: Scene, rng: np.random.Generator) -> tuple[Footprints, Prepared | None]:
         seed = int(rng.integers(2**63))

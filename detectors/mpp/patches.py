@@ -1,4 +1,4 @@
-"""Patches: cells of roof that hang together, and what they touch.
+"""Patches: connected cells of roof, and what they touch.
 
 Nouns
 -----
@@ -11,9 +11,9 @@ rim
     The neighbours of a patch outside it, each counted as often as it touches. Cells without points do not count; the
     border of the grid does.
 
-Bands of rows are labelled by themselves, each from the number of its first cell on, so that numbers of different bands
-never meet; then what touches across their borders is joined, and the numbers of what is joined are counted off in
-rising order. The smallest number of a patch is that of its first cell, so labels do not tell where bands met.
+Bands of rows are labelled independently, each with numbers from that of its first cell on, so that bands share no
+number. Then patches that touch across a border of bands are joined, and renumbered in rising order. The smallest number
+of a patch is that of its first cell, so labels do not depend on the bands.
 """
 
 from __future__ import annotations
@@ -21,20 +21,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from .arrays import Heights, Integers, Labels, Mask, States
 from .cells import VOID
 from .threads import ONE_THREAD, Threads
 
 __all__ = ["Rims", "cells_of_patches", "count_rims", "label_patches", "patch_sizes"]
 
-_Labels = NDArray[np.int32]
-
 
 def label_patches(
-    height: NDArray[np.int32], mask: NDArray[np.bool_] | _Labels, step: int, *, threads: Threads = ONE_THREAD
-) -> tuple[_Labels, int]:
+    height: Heights, mask: Mask | Labels, step: int, *, threads: Threads = ONE_THREAD
+) -> tuple[Labels, int]:
     """Label the patches of the cells that a mask chooses; also return how many there are.
 
     Parameters
@@ -48,7 +46,7 @@ def label_patches(
     threads : Threads
     """
     labels = np.empty(height.shape, dtype=np.int32)
-    # Laid out for the worst case, a patch for each cell; only what is written takes memory.
+    # Sized for the worst case, a patch for each cell; pages that are not written take no memory.
     parent = np.empty(height.size + 1, dtype=np.int32)
     numbered = threads.bands(
         lambda first, last: _label_rows(height, mask, step, first, last, labels, parent), len(height)
@@ -56,13 +54,15 @@ def label_patches(
     bands = np.array(numbered, dtype=np.int64)
     for row in bands[1:, 0]:
         _join_rows(height, labels, step, row, parent)
-    count = _count_off(parent, bands, height.shape[1])
+    count = _renumber(parent, bands, height.shape[1])
     threads.bands(lambda first, last: _relabel(labels, parent, first, last), len(height))
     return labels, count
 
 
 @kernel
-def _label_rows(height, mask, step, first, last, labels, parent):  # type: ignore[no-untyped-def]
+def _label_rows(
+    height: Heights, mask: Mask | Labels, step: int, first: int, last: int, labels: Labels, parent: Labels
+) -> tuple[int, int]:
     """Label the patches of some rows, some with several numbers that `parent` joins; return first row, last number."""
     columns = height.shape[1]
     number = first * columns
@@ -88,7 +88,7 @@ def _label_rows(height, mask, step, first, last, labels, parent):  # type: ignor
 
 
 @kernel
-def _unite(parent, one, other):  # type: ignore[no-untyped-def]
+def _unite(parent: Labels, one: int, other: int) -> int:
     """Join two numbers; return the smallest of what now belongs together."""
     while parent[one] != one:
         parent[one] = parent[parent[one]]
@@ -102,7 +102,7 @@ def _unite(parent, one, other):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _join_rows(height, labels, step, row, parent):  # type: ignore[no-untyped-def]
+def _join_rows(height: Heights, labels: Labels, step: int, row: int, parent: Labels) -> None:
     """Join what touches across the border above a row."""
     for c in range(labels.shape[1]):
         if labels[row - 1, c] > 0 and labels[row, c] > 0 and abs(height[row - 1, c] - height[row, c]) <= step:
@@ -110,8 +110,8 @@ def _join_rows(height, labels, step, row, parent):  # type: ignore[no-untyped-de
 
 
 @kernel
-def _count_off(parent, bands, columns):  # type: ignore[no-untyped-def]
-    """Put labels in the place of parents; return how many there are."""
+def _renumber(parent: Labels, bands: Integers, columns: int) -> int:
+    """Replace parents by labels; return how many there are."""
     count = 0
     for b in range(len(bands)):
         for number in range(bands[b, 0] * columns + 1, bands[b, 1] + 1):
@@ -125,22 +125,21 @@ def _count_off(parent, bands, columns):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _relabel(labels, parent, first, last):  # type: ignore[no-untyped-def]
+def _relabel(labels: Labels, parent: Labels, first: int, last: int) -> None:
+    """Replace the numbers of some rows by labels."""
     for r in range(first, last):
         for c in range(labels.shape[1]):
             if labels[r, c] > 0:
                 labels[r, c] = parent[labels[r, c]]
 
 
-def patch_sizes(labels: _Labels, count: int, *, threads: Threads = ONE_THREAD) -> NDArray[np.int64]:
+def patch_sizes(labels: Labels, count: int, *, threads: Threads = ONE_THREAD) -> Integers:
     """Return how many cells have each label, shape (count + 1,), 0 for label 0."""
     tallies = threads.bands(lambda first, last: _tally(labels, count, first, last), len(labels))
     return np.asarray(np.sum(tallies, axis=0))
 
 
-def cells_of_patches(
-    labels: _Labels, count: int, *, threads: Threads = ONE_THREAD
-) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+def cells_of_patches(labels: Labels, count: int, *, threads: Threads = ONE_THREAD) -> tuple[Labels, Integers]:
     """Return row and column of all cells of patches, patch by patch, and where each patch begins, shape (count + 1,).
 
     The cells of the patch with label k are those from ``starts[k - 1]`` to ``starts[k]``, in the order of the rows.
@@ -155,7 +154,7 @@ def cells_of_patches(
 
 
 @kernel
-def _tally(labels, count, first, last):  # type: ignore[no-untyped-def]
+def _tally(labels: Labels, count: int, first: int, last: int) -> Integers:
     """Return how many cells of some rows have each label; none are counted for 0."""
     tally = np.zeros(count + 1, dtype=np.int64)
     for r in range(first, last):
@@ -166,7 +165,7 @@ def _tally(labels, count, first, last):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _sort_cells(labels, first, last, place, cells):  # type: ignore[no-untyped-def]
+def _sort_cells(labels: Labels, first: int, last: int, place: Integers, cells: Labels) -> None:
     """Write the cells of some rows to the places of their labels, which are moved on."""
     for r in range(first, last):
         for c in range(labels.shape[1]):
@@ -189,26 +188,26 @@ class Rims:
         How much of the rim is roof that lies low enough.
     """
 
-    cells: NDArray[np.int64]
-    length: NDArray[np.int64]
-    roof: NDArray[np.int64]
+    cells: Integers
+    length: Integers
+    roof: Integers
 
-    def carried(self, share: float) -> NDArray[np.bool_]:
+    def carried(self, share: float) -> Mask:
         """Return which patches have such roof on at least a share of their rim."""
         return np.asarray((self.roof > 0) & (self.roof >= share * self.length))
 
 
 def count_rims(
-    patches: _Labels,
+    patches: Labels,
     count: int,
-    height: NDArray[np.int32],
-    state: NDArray[np.uint8],
-    roof: _Labels,
+    height: Heights,
+    state: States,
+    roof: Labels,
     *,
     fall: int,
     threads: Threads = ONE_THREAD,
 ) -> Rims:
-    """Go round all patches.
+    """Measure the rims of all patches.
 
     Parameters
     ----------
@@ -226,14 +225,16 @@ def count_rims(
     threads : Threads
     """
 
-    def work(first: int, last: int) -> NDArray[np.int64]:
-        return _go_round(patches, count, height, state, roof, fall, first, last)  # type: ignore[no-any-return]
+    def work(first: int, last: int) -> Integers:
+        return _measure_rims(patches, count, height, state, roof, fall, first, last)  # type: ignore[no-any-return]
 
     return Rims(*np.sum(threads.bands(work, len(patches)), axis=0))
 
 
 @kernel
-def _go_round(patches, count, height, state, roof, fall, first, last):  # type: ignore[no-untyped-def]
+def _measure_rims(
+    patches: Labels, count: int, height: Heights, state: States, roof: Labels, fall: int, first: int, last: int
+) -> Integers:
     """Return cells, length of the rim and roof on it, shape (3, count + 1), of the cells of some rows."""
     rows, columns = patches.shape
     found = np.zeros((3, count + 1), dtype=np.int64)

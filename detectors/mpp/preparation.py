@@ -18,17 +18,19 @@ from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from .annealing import Boxes
 from .arrays import Heights, Mask, Rectangles, Scores, States
-from .background import Background, estimate_background, fitted_cells, score_cells, textures
+from .background import Background, estimate_background
 from .candidates import propose_boxes
-from .cells import Cells, cell_size, make_cells
+from .cells import cell_size, make_cells
 from .energy import Model, rectangle_energies
 from .memory import release_memory
 from .parameters import MPPParameters
+from .scores import Weights, fitted_cells, score_cells
 from .superstructures import lower_superstructures
 from .tables import LONGEST, TALLEST, Tables, make_tables
+from .textures import textures
 from .threads import Threads
 
-__all__ = ["Prepared", "prepare"]
+__all__ = ["Prepared", "prepare", "weights_of"]
 
 #: Square metres: largest rough place that counts as a structure of the roof around it, smallest box that is proposed.
 _LARGEST_STRUCTURE, _SMALLEST_BOX = 40.0, 6.0
@@ -119,7 +121,8 @@ def _classes(
     low = _LOW_SHARE * parameters.least_height
     cells = make_cells(points, scene.heights.ground, Grid.covering(scene.extent, cell), low=low, threads=threads)
     background, bins = estimate_background(cells, threads=threads)
-    fitted = _fitted(parameters, cells, bins, background, threads)
+    weights = weights_of(parameters)
+    fitted = fitted_cells(cells, bins, background, weights, threads=threads)
     if parameters.carried_share <= 1:
         height, state = lower_superstructures(
             cells.height,
@@ -132,26 +135,20 @@ def _classes(
         )
         cells = replace(cells, height=height, state=state)
         bins = textures(cells.height, cells.state, cells.openness, threads=threads)
-        fitted = _fitted(parameters, cells, bins, background, threads)
-    score = score_cells(
-        cells,
-        bins,
-        background,
-        fit_weight=parameters.fit_weight,
-        texture_weight=parameters.texture_weight,
-        texture_limit=parameters.texture_limit,
-        low_price=parameters.low_price,
-        void_price=parameters.void_price,
-        threads=threads,
-    )
+        fitted = fitted_cells(cells, bins, background, weights, threads=threads)
+    score = score_cells(cells, bins, background, weights, threads=threads)
     return background, cells.height, cells.state, score, fitted
 
 
-def _fitted(
-    parameters: MPPParameters, cells: Cells, bins: NDArray[np.int16], background: Background, threads: Threads
-) -> Mask:
-    weight, limit = parameters.texture_weight, parameters.texture_limit
-    return fitted_cells(cells, bins, background, texture_weight=weight, texture_limit=limit, threads=threads)
+def weights_of(parameters: MPPParameters) -> Weights:
+    """Return how observations count."""
+    return Weights(
+        fit=parameters.fit_weight,
+        texture=parameters.texture_weight,
+        limit=parameters.texture_limit,
+        low=parameters.low_price,
+        void=parameters.void_price,
+    )
 
 
 def _model(parameters: MPPParameters, cell: float) -> Model:

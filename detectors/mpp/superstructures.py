@@ -4,29 +4,29 @@ Nouns
 -----
 patch, rim
     See `patches`; of cells with the texture of a roof, and of the rough cells between them (walls, which have any
-    height between two roofs, and furniture), which take the height of the roof beside them that is nearer in height
-    (`rough`). Crowns belong to none.
+    height between two roofs, and roof structures), which take the height of the roof beside them that is nearer in
+    height (`roughness`). Crowns belong to none.
 superstructure
     A patch whose rim is lower roof nearly all round. A house in a row is none: its front and back stand free.
-furniture
-    A small rough place with roof nearly all round.
+roof structure
+    A small rough area with roof nearly all round: chimneys, ducts, a terrace with plants.
 
-Storeys of frames are lowered first (`frames`), then furniture and superstructures, towers on towers from the top down:
-each cell to the level of the roof beside it, before roofs are fitted, so that it neither spoils the fit nor is cut out
-as a building of its own.
+Storeys of frames are lowered first (`frames`), then roof structures and superstructures, towers on towers from the top
+down: each cell to the level of the roof beside it, before roofs are fitted, so that it neither spoils the fit nor
+becomes a building of its own.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from .arrays import Heights, Labels, Mask, States
 from .candidates import propose_boxes
 from .cells import HIGH, LOW
 from .frames import lower_storeys
 from .patches import count_rims, label_patches
-from .rough import smooth_walls
+from .roughness import assign_rough_cells
 from .threads import ONE_THREAD, Threads
 
 __all__ = ["lower_superstructures"]
@@ -35,23 +35,23 @@ __all__ = ["lower_superstructures"]
 _LEDGE = 30
 #: Longest run of void cells that a tower's shadow leaves on a roof.
 _SHADOW = 12
-#: More centimetres than any two heights differ by.
+#: Centimetres: more than any two heights differ by.
 _ANY = 1 << 30
-#: What a cell that sinks goes through.
+#: States of the cells that are to be lowered.
 _DONE, _WAITING, _NEXT = np.uint8(0), np.uint8(1), np.uint8(2)
 
 
 def lower_superstructures(
-    height: NDArray[np.int32],
-    state: NDArray[np.uint8],
-    roof: NDArray[np.bool_],
+    height: Heights,
+    state: States,
+    roof: Mask,
     *,
     step: float,
     share: float,
     most: int,
     rounds: int = 5,
     threads: Threads = ONE_THREAD,
-) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+) -> tuple[Heights, States]:
     """Return heights and states with superstructures lowered to the roofs that carry them, and their shadows filled.
 
     Parameters
@@ -66,9 +66,9 @@ def lower_superstructures(
     share : float
         Share of the rim that must be lower roof; more than 1 changes nothing.
     most : int
-        Cells that a rough place may have to count as furniture of the roof around it.
+        Largest number of cells of a roof structure.
     rounds : int
-        Towers on towers that are lowered.
+        Largest number of superstructures on top of each other.
     threads : Threads
     """
     if share > 1:
@@ -76,8 +76,8 @@ def lower_superstructures(
     limit = round(100 * step)
     lowered, state = _lower_storeys(height, state, roof, limit, threads)
     labels, count = label_patches(lowered, roof, limit, threads=threads)
-    smooth_walls(lowered, state, labels, threads=threads)
-    if _fill_rough(lowered, state, labels, share, most, threads):
+    assign_rough_cells(lowered, state, labels, threads=threads)
+    if _level_structures(lowered, state, labels, share, most, threads):
         labels, count = label_patches(lowered, labels, limit, threads=threads)
     for turn in range(rounds):
         if turn > 0:
@@ -87,9 +87,7 @@ def lower_superstructures(
     return lowered, state
 
 
-def _lower_storeys(
-    height: NDArray[np.int32], state: NDArray[np.uint8], roof: NDArray[np.bool_], step: int, threads: Threads
-) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+def _lower_storeys(height: Heights, state: States, roof: Mask, step: int, threads: Threads) -> tuple[Heights, States]:
     """Return heights and states with the storeys of frames lowered."""
     rows, columns = state.shape
     smooth, lowered, filled = np.empty_like(height), np.empty_like(height), np.empty_like(state)
@@ -105,7 +103,7 @@ def _lower_storeys(
 
     threads.bands(begin, rows)
     labels, count = label_patches(smooth, solid, step, threads=threads)
-    smooth_walls(smooth, state, labels, threads=threads)
+    assign_rough_cells(smooth, state, labels, threads=threads)
     threads.bands(lambda first, last: np.equal(state[first:last], HIGH, out=solid[first:last]), rows)
     threads.bands(lambda first, last: _add_shadows(state, first, last, solid), rows)
     threads.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
@@ -121,7 +119,7 @@ def _lower_storeys(
 
 
 @kernel
-def _add_shadows(state, first, last, solid):  # type: ignore[no-untyped-def]
+def _add_shadows(state: States, first: int, last: int, solid: Mask) -> None:
     """Add the runs of void cells between two high ones of a row, in place: shadows of towers."""
     for r in range(first, last):
         high = -_SHADOW
@@ -135,10 +133,10 @@ def _add_shadows(state, first, last, solid):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _add_ledges(height, state, roof, first, last, solid):  # type: ignore[no-untyped-def]
+def _add_ledges(height: Heights, state: States, roof: Mask, first: int, last: int, solid: Mask) -> None:
     """Fill for some rows which cells are roof or, if high, share their height with four of their eight neighbours.
 
-    A ledge around a tower is too narrow for a window of texture, and level nevertheless.
+    A ledge around a tower is too narrow for a window of texture, but it is level.
     """
     rows, columns = state.shape
     for r in range(first, last):
@@ -154,30 +152,30 @@ def _add_ledges(height, state, roof, first, last, solid):  # type: ignore[no-unt
             solid[r, c] = level > 4
 
 
-def _fill_rough(
-    height: NDArray[np.int32],
-    state: NDArray[np.uint8],
-    labels: NDArray[np.int32],
+def _level_structures(
+    height: Heights,
+    state: States,
+    labels: Labels,
     share: float,
     most: int,
     threads: Threads,
 ) -> bool:
-    """Level rough places that roof surrounds, in place; return whether there was any."""
-    rough = np.empty(labels.shape, dtype=np.bool_)
+    """Level the roof structures, in place; return whether there was any."""
+    rough_cells = np.empty(labels.shape, dtype=np.bool_)
 
     def begin(first: int, last: int) -> None:
-        np.logical_and(state[first:last] == HIGH, labels[first:last] == 0, out=rough[first:last])
+        np.logical_and(state[first:last] == HIGH, labels[first:last] == 0, out=rough_cells[first:last])
 
-    threads.bands(begin, len(rough))
-    places, count = label_patches(height, rough, _ANY, threads=threads)
-    rims = count_rims(places, count, height, state, labels, fall=-_ANY, threads=threads)
-    return _sink(height, labels, places, rims.carried(share) & (rims.cells <= most), _ANY, threads)
+    threads.bands(begin, len(rough_cells))
+    areas, count = label_patches(height, rough_cells, _ANY, threads=threads)
+    rims = count_rims(areas, count, height, state, labels, fall=-_ANY, threads=threads)
+    return _lower_to_roof(height, labels, areas, rims.carried(share) & (rims.cells <= most), _ANY, threads)
 
 
 def _lower(
-    height: NDArray[np.int32],
-    state: NDArray[np.uint8],
-    labels: NDArray[np.int32],
+    height: Heights,
+    state: States,
+    labels: Labels,
     count: int,
     share: float,
     step: int,
@@ -185,42 +183,43 @@ def _lower(
 ) -> bool:
     """Lower the superstructures in place; return whether there was any."""
     rims = count_rims(labels, count, height, state, labels, fall=1, threads=threads)
-    return _sink(height, labels, labels, rims.carried(share), -step // 2, threads)
+    return _lower_to_roof(height, labels, labels, rims.carried(share), -step // 2, threads)
 
 
-def _sink(
-    height: NDArray[np.int32],
-    labels: NDArray[np.int32],
-    patches: NDArray[np.int32],
-    sinking: NDArray[np.bool_],
+def _lower_to_roof(
+    height: Heights,
+    labels: Labels,
+    patches: Labels,
+    chosen: Mask,
     above: int,
     threads: Threads,
 ) -> bool:
     """Give the cells of some patches the height of the roof beside them, in place; return whether there was any.
 
-    Roof counts that is at most `above` centimetres higher than the cell; a step of the roof below goes on under what
-    stands on it.
+    Only roof at most `above` centimetres higher than the cell counts; a step of the roof below continues under the
+    superstructure.
     """
-    if not sinking.any():
+    if not chosen.any():
         return False
     waiting = np.empty(labels.shape, dtype=np.uint8)
-    threads.bands(lambda first, last: _choose(patches, sinking, first, last, waiting), len(waiting))
+    threads.bands(lambda first, last: _choose(patches, chosen, first, last, waiting), len(waiting))
     rings = threads.bands(lambda first, last: _outer_ring(height, labels, waiting, first, last, above), len(waiting))
-    _sink_rings(height, labels, waiting, np.concatenate(rings), above)
+    _lower_rings(height, labels, waiting, np.concatenate(rings), above)
     return True
 
 
 @kernel
-def _choose(patches, sinking, first, last, waiting):  # type: ignore[no-untyped-def]
+def _choose(patches: Labels, chosen: Mask, first: int, last: int, waiting: States) -> None:
+    """Mark for some rows the cells of the chosen patches."""
     for r in range(first, last):
         for c in range(patches.shape[1]):
-            waiting[r, c] = _WAITING if sinking[patches[r, c]] else _DONE
+            waiting[r, c] = _WAITING if chosen[patches[r, c]] else _DONE
 
 
 @kernel
-def _outer_ring(height, labels, waiting, first, last, above):  # type: ignore[no-untyped-def]
+def _outer_ring(height: Heights, labels: Labels, waiting: States, first: int, last: int, above: int) -> Labels:
     """Return row and column of the waiting cells of some rows that have roof beside them."""
-    # Laid out for the worst case; only what is written takes memory.
+    # Sized for the worst case; pages that are not written take no memory.
     ring = np.empty(((last - first) * waiting.shape[1], 2), dtype=np.int32)
     size = 0
     for r in range(first, last):
@@ -232,8 +231,8 @@ def _outer_ring(height, labels, waiting, first, last, above):  # type: ignore[no
 
 
 @kernel
-def _sink_rings(height, labels, waiting, ring, above):  # type: ignore[no-untyped-def]
-    """Let waiting cells sink, in place, one ring at a time, so that no direction is favoured."""
+def _lower_rings(height: Heights, labels: Labels, waiting: States, ring: Labels, above: int) -> None:
+    """Lower waiting cells, in place, one ring at a time, so that no direction is favoured."""
     rows, columns = height.shape
     for k in range(len(ring)):
         waiting[ring[k, 0], ring[k, 1]] = _NEXT
@@ -259,7 +258,7 @@ def _sink_rings(height, labels, waiting, ring, above):  # type: ignore[no-untype
 
 
 @kernel
-def _beside(height, labels, waiting, r, c, above):  # type: ignore[no-untyped-def]
+def _beside(height: Heights, labels: Labels, waiting: States, r: int, c: int, above: int) -> int:
     """Mean height of the roof among a cell's eight neighbours, of the level that most of them share; -1 without one."""
     rows, columns = height.shape
     levels = np.empty(8, dtype=np.int64)

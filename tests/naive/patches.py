@@ -52,7 +52,7 @@ def rims(patches, height, state, roof, fall):
     return cells, length, low
 
 
-def smooth_walls(height, state, labels, high, rounds=8):
+def assign_rough_cells(height, state, labels, high, rounds=8):
     """Height and labels after all rounds; ties go to the neighbour that comes first."""
     for _ in range(rounds):
         new_height, new_labels = height.copy(), labels.copy()

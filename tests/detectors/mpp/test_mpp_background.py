@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 from naive import mpp as naive
 
-from roofbench.detectors.mpp.background import Background, estimate_background, fitted_cells, mean_evidence, restrain
+from roofbench.detectors.mpp.background import Background, estimate_background
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, Cells, cell_size
 from roofbench.detectors.mpp.rectangles import inside_any
+from roofbench.detectors.mpp.scores import Weights, fitted_cells, mean_evidence, restrain
 from roofbench.detectors.mpp.threads import started_threads
 from roofbench.scenes.geodata.raster import Grid
+
+WEIGHTS = Weights(fit=0.2, texture=1.0, limit=3.0, low=5.0, void=0.1)
 
 
 @pytest.mark.parametrize(
@@ -45,7 +48,7 @@ def test_classes_and_fitted_cells_are_those_of_the_evidence_for_any_number_of_th
     alone, bins = estimate_background(cells)
     with started_threads(count) as threads:
         background, same = estimate_background(cells, threads=threads)
-        fitted = fitted_cells(cells, bins, background, texture_weight=1.0, texture_limit=3.0, threads=threads)
+        fitted = fitted_cells(cells, bins, background, WEIGHTS, threads=threads)
     assert background == alone
     np.testing.assert_array_equal(same, bins)
     evidence = np.array(background.evidence).ravel()
@@ -61,7 +64,7 @@ def test_the_mean_evidence_is_that_of_the_high_cells_inside_without_the_height_i
     height = rng.integers(250, 2500, state.shape).astype(np.uint16)
     crowns = Background(8.0, 3.0, 0.3, 0.05, 0.4, (), 0)
     rectangles = np.array([[20.0, 15.0, 12.0, 7.0, 0.6], [2.0, 2.0, 9.0, 5.0, 2.0], [200.0, 15.0, 5.0, 5.0, 0.0]])
-    found = mean_evidence(rectangles, height, state, score, crowns, fit_weight=0.2)
+    found = mean_evidence(rectangles, height, state, score, crowns, WEIGHTS)
     density = np.log(np.exp(-0.5 * ((height / 100 - 8) / 3) ** 2) / (3 * np.sqrt(2 * np.pi)))
     evidence = score / 1000 + np.where(score > 0, 0.2 * np.maximum(density, -5), 0)
     for rectangle, mean in zip(rectangles, found, strict=True):

@@ -1,4 +1,4 @@
-"""Patches, their rims and what is eaten up and lowered are those of the slow oracles, for any number of threads."""
+"""Patches, their rims and what is assigned and lowered are those of the slow oracles, for any number of threads."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from roofbench.detectors.mpp.cells import HIGH, LOW, VOID
 from roofbench.detectors.mpp.frames import _REACH, _cells_of, _waves
 from roofbench.detectors.mpp.patches import cells_of_patches, count_rims, label_patches, patch_sizes
 from roofbench.detectors.mpp.rectangles import corners
-from roofbench.detectors.mpp.rough import smooth_walls
-from roofbench.detectors.mpp.superstructures import _sink, lower_superstructures
+from roofbench.detectors.mpp.roughness import assign_rough_cells
+from roofbench.detectors.mpp.superstructures import _lower_to_roof, lower_superstructures
 from roofbench.detectors.mpp.threads import started_threads
 
 SHAPES = [(1, 1), (1, 9), (2, 30), (40, 1), (33, 47)]
@@ -96,12 +96,12 @@ def test_cells_and_rims_of_patches_are_those_of_the_oracle(shape, threads):
             np.testing.assert_array_equal(values, [expected[name] for name in names])
 
 
-def test_walls_are_eaten_up_round_by_round(threads):
+def test_rough_cells_are_assigned_round_by_round(threads):
     height, state, roof = town(2, 60)
     roof &= np.random.default_rng(3).random(roof.shape) < 0.75
     labels, _ = naive.label_patches(height, roof, 100)
-    expected = naive.smooth_walls(height, state, labels, HIGH)
-    smooth_walls(height, state, labels, threads=threads)
+    expected = naive.assign_rough_cells(height, state, labels, HIGH)
+    assign_rough_cells(height, state, labels, threads=threads)
     np.testing.assert_array_equal(height, expected[0])
     np.testing.assert_array_equal(labels, expected[1])
 
@@ -114,9 +114,9 @@ def test_cells_sink_ring_by_ring(above, threads):
     sinking[0] = False
     expected = naive.sink(height, labels, sinking[labels], above)
     assert (expected != height).any()
-    assert _sink(height, labels, labels.copy(), sinking, above, threads)
+    assert _lower_to_roof(height, labels, labels.copy(), sinking, above, threads)
     np.testing.assert_array_equal(height, expected)
-    assert not _sink(height, labels, labels.copy(), np.zeros_like(sinking), above, threads)
+    assert not _lower_to_roof(height, labels, labels.copy(), np.zeros_like(sinking), above, threads)
 
 
 def test_boxes_and_superstructures_do_not_depend_on_the_number_of_threads(threads):
