@@ -4,7 +4,7 @@ Nouns
 -----
 YIQ
     Intensity Y in [0, 1], hue I in [-0.5957, 0.5957] and saturation Q in [-0.5226, 0.5226] of a colour (NTSC), as the
-    paper names them; their histograms have 10, 20 and 20 bins.
+    paper names them; their histograms have 10, 20 and 20 bins, or bins of 0.1 each.
 part
     Run of histogram bins around one peak, from minimum to minimum; a minimum belongs to the part to its left.
 range
@@ -17,6 +17,7 @@ Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.4.1.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -25,10 +26,10 @@ from numpy.typing import NDArray
 from ...core.kernels import kernel
 from .boxes import column_range, row_range
 
-__all__ = ["BINS", "Colours", "dominant_bins", "dominant_ranges", "yiq_bins"]
+__all__ = ["BINS", "TENTHS", "Colours", "dominant_bins", "dominant_ranges", "yiq_bins"]
 
-#: Bins of Y, I and Q.
-BINS = (10, 20, 20)
+#: Bins of Y, I and Q, as printed and where all are 0.1 wide.
+BINS, TENTHS = (10, 20, 20), (10, 12, 12)
 _I_RANGE = 0.5957
 _Q_RANGE = 0.5226
 
@@ -41,10 +42,13 @@ class Colours(NamedTuple):
     values : ndarray of uint8 or uint16, shape (3, rows, columns)
     full : float
         Value of full brightness: 255 or 65535.
+    tenths : bool
+        Whether the bins of all three histograms are 0.1 wide.
     """
 
     values: NDArray[np.uint8] | NDArray[np.uint16]
     full: float
+    tenths: bool = False
 
 
 @kernel
@@ -56,6 +60,8 @@ def yiq_bins(colours: Colours, row: int, column: int) -> tuple[int, int, int]:
     y = 0.299 * r + 0.587 * g + 0.114 * b
     i = 0.595716 * r - 0.274453 * g - 0.321263 * b
     q = 0.211456 * r - 0.522591 * g + 0.311135 * b
+    if colours.tenths:
+        return min(max(int(y * 10), 0), 9), math.floor(i * 10) + 6, math.floor(q * 10) + 6
     return (
         min(max(int(y * 10), 0), 9),
         min(max(int((i + _I_RANGE) / (2 * _I_RANGE) * 20), 0), 19),
@@ -128,6 +134,6 @@ def dominant_ranges(
             histograms[2, q] += 1
     within = np.zeros((3, 20), dtype=np.bool_)
     for band in range(3):
-        bins = BINS[band]
+        bins = (TENTHS if colours.tenths else BINS)[band]
         within[band, :bins] = dominant_bins(histograms[band, :bins], part_share, total_share)
     return within

@@ -53,6 +53,8 @@ class Growth(NamedTuple):
         Least length of the parts of a strip; a strip up to twice as long is one.
     vegetation, entropy : float
         Thresholds, 0..255.
+    same_kind : bool
+        Whether strips beside a line that is green need to be green and smooth, and the others not green.
     """
 
     step: float
@@ -61,6 +63,7 @@ class Growth(NamedTuple):
     part: float
     vegetation: float
     entropy: float
+    same_kind: bool = False
 
 
 def last_step(rules: Growth) -> float:
@@ -88,22 +91,25 @@ def mean_in_boxes(prefix: NDArray[np.int32], boxes: NDArray[np.float64]) -> NDAr
 
 
 @kernel
-def is_vegetation(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> bool:
-    """Return whether the cells in a box look like vegetation."""
-    if mean_in_box(cover.vegetation, box) <= rules.vegetation:
+def is_vegetation(cover: Cover, rules: Growth, box: NDArray[np.float64], green: bool) -> bool:
+    """Return whether the cells in a box look like vegetation; with `same_kind`, unlike the line, green or not."""
+    is_green = mean_in_box(cover.vegetation, box) > rules.vegetation
+    if rules.same_kind and is_green != green:
+        return True
+    if not is_green:
         return False
     return len(cover.entropy) == 0 or mean_in_box(cover.entropy, box) > rules.entropy
 
 
 @kernel
-def passes(cover: Cover, rules: Growth, strip: NDArray[np.float64]) -> bool:
+def passes(cover: Cover, rules: Growth, strip: NDArray[np.float64], green: bool) -> bool:
     """Return whether a part of a strip may be added."""
     black, _, cells = sum_in_box(cover.black, strip)
-    return cells > 0 and black > rules.black_share * cells and not is_vegetation(cover, rules, strip)
+    return cells > 0 and black > rules.black_share * cells and not is_vegetation(cover, rules, strip, green)
 
 
 @kernel
-def parts_pass(cover: Cover, rules: Growth, strip: NDArray[np.float64], start: int) -> bool:
+def parts_pass(cover: Cover, rules: Growth, strip: NDArray[np.float64], start: int, green: bool) -> bool:
     """Return whether each part of a strip passes; `start` is where its interval along the side begins, `U0` or `V0`."""
     first, last = strip[start], strip[start + 1]
     parts = max(1, int((last - first) / rules.part))
@@ -111,13 +117,13 @@ def parts_pass(cover: Cover, rules: Growth, strip: NDArray[np.float64], start: i
     piece = strip.copy()
     for k in range(parts):
         piece[start], piece[start + 1] = first + k * width, first + (k + 1) * width
-        if not passes(cover, rules, piece):
+        if not passes(cover, rules, piece, green):
             return False
     return True
 
 
 @kernel
-def extended_side(cover: Cover, rules: Growth, box: NDArray[np.float64], side: int) -> float:
+def extended_side(cover: Cover, rules: Growth, box: NDArray[np.float64], side: int, green: bool) -> float:
     """Return how far one end (`U0`, `U1`, `V0` or `V1`) of a box can move outwards while the strips pass."""
     outwards = 1.0 if side in (U1, V1) else -1.0
     step, reached = rules.step, box[side]
@@ -126,7 +132,7 @@ def extended_side(cover: Cover, rules: Growth, box: NDArray[np.float64], side: i
     while step >= rules.least_step:
         end = reached + outwards * step
         strip[side], strip[opposite] = end, reached
-        if parts_pass(cover, rules, strip, V0 if side in (U0, U1) else U0):
+        if parts_pass(cover, rules, strip, V0 if side in (U0, U1) else U0, green):
             reached = end
         else:
             step /= 2
@@ -134,23 +140,25 @@ def extended_side(cover: Cover, rules: Growth, box: NDArray[np.float64], side: i
 
 
 @kernel
-def extend_lines(cover: Cover, rules: Growth, lines: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
-    """Return the lines with both ends extended; strips are `depth` pixels deep on the black side."""
+def extend_lines(
+    cover: Cover, rules: Growth, lines: NDArray[np.float64], depth: float, green: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the lines, green or not, with both ends extended; strips are `depth` pixels deep on the black side."""
     out = lines.copy()
     for i in range(len(lines)):
         box = lines[i].copy()
         box[V1] = depth
-        out[i, U0] = extended_side(cover, rules, box, U0)
-        out[i, U1] = extended_side(cover, rules, box, U1)
+        out[i, U0] = extended_side(cover, rules, box, U0, green[i])
+        out[i, U1] = extended_side(cover, rules, box, U1, green[i])
     return out
 
 
 @kernel
-def extend_rectangle(cover: Cover, rules: Growth, box: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rectangle with the side opposite to its line extended, then both lateral ones."""
+def extend_rectangle(cover: Cover, rules: Growth, box: NDArray[np.float64], green: bool) -> NDArray[np.float64]:
+    """Return the rectangle of a line, green or not, with the opposite side extended, then both lateral ones."""
     out = box.copy()
     for side in (V1, U0, U1):
-        out[side] = extended_side(cover, rules, out, side)
+        out[side] = extended_side(cover, rules, out, side, green)
     return out
 
 

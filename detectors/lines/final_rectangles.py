@@ -10,7 +10,8 @@ rise
 
 A strip passes when more than 40 % of it is in range in each of Y, I and Q, more than 90 % is black in the secondary
 mask, and the primary black does not rise. A rise after the primary black fell below 10 % ends the side; any other
-failure halves the strip, down to the ground sampling distance.
+failure halves the strip, down to the ground sampling distance. The authors' own program differs (`filled_share`,
+`independent` and `rises_after_gap` of `FinalRules`).
 Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.4.
 """
 
@@ -23,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, to_box
+from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, column_range, row_range, to_box
 from .colours import Colours, dominant_ranges, yiq_bins
 
 __all__ = ["DROPPED", "FinalRules", "final_rectangles", "shrink"]
@@ -51,6 +52,12 @@ class FinalRules(NamedTuple):
         Largest increase of primary black that does not count as a rise.
     whole_initial : bool
         Whether an initial rectangle is compared with final ones before it is shrunk.
+    filled_share : float
+        Least share of the shrunk rectangle that is black in the secondary mask; else it is dropped.
+    independent : bool
+        Whether all sides are extended from the shrunk rectangle, each by itself, and not one after another.
+    rises_after_gap : bool
+        Whether a rise counts only after the primary black fell below `gap_share`.
     """
 
     reduction: float
@@ -63,6 +70,9 @@ class FinalRules(NamedTuple):
     gap_share: float
     rise: float
     whole_initial: bool
+    filled_share: float = 0.0
+    independent: bool = False
+    rises_after_gap: bool = False
 
 
 @kernel
@@ -135,20 +145,36 @@ def extended_final_side(
     """Return how far one side of a box can move outwards while the strips pass."""
     outwards = 1.0 if side in (U1, V1) else -1.0
     opposite = U0 + U1 - side if side in (U0, U1) else V0 + V1 - side
-    width, before, reached = rules.strip, 1.0, box[side]
+    width, before, reached, gap = rules.strip, 1.0, box[side], False
     strip = box.copy()
     while width >= rules.least_strip:
         end = reached + outwards * width
         strip[side], strip[opposite] = end, reached
         in_range, black, filled = strip_shares(colours, primary, secondary, within, strip)
         rises = black > before + rules.rise
-        if rises and before < rules.gap_share:
+        gap = gap or before < rules.gap_share if rules.rises_after_gap else before < rules.gap_share
+        if rises and gap:
             break
-        if in_range > rules.colour_share and filled > rules.black_share and not rises:
+        if in_range > rules.colour_share and filled > rules.black_share and (rules.rises_after_gap or not rises):
             reached, before = end, black
         else:
             width /= 2
     return float(reached)
+
+
+@kernel
+def black_share(mask: NDArray[np.uint8], box: NDArray[np.float64]) -> float:
+    """Return the share of the cells in a box that are black; cells beyond the raster are white."""
+    rows, columns = mask.shape
+    black, cells = 0, 0
+    first_row, last_row = row_range(box)
+    for row in range(first_row, last_row):
+        first, last = column_range(box, row)
+        cells += last - first
+        if 0 <= row < rows:
+            for column in range(max(first, 0), min(last, columns)):
+                black += mask[row, column]
+    return black / cells if cells > 0 else 0.0
 
 
 @kernel
@@ -183,11 +209,14 @@ def final_rectangles(
             if lies_inside(compared, out[j]):
                 inside = True
                 break
-        if inside:
+        if inside or (rules.filled_share > 0 and black_share(secondary, box) < rules.filled_share):
             continue
         within = dominant_ranges(colours, box, rules.part_share, rules.total_share)
+        start = box.copy()
         for side in (V0, V1, U0, U1):
-            box[side] = extended_final_side(colours, primary, secondary, within, rules, box, side)
+            box[side] = extended_final_side(
+                colours, primary, secondary, within, rules, start if rules.independent else box, side
+            )
         out[found], final_of[i] = box, found
         found += 1
     return out[:found].copy(), final_of

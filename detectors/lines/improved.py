@@ -22,6 +22,7 @@ from .entropy import grey_levels, local_entropy
 from .extension import band, mean_in_boxes
 from .image_edges import ImageEdges, extract_edges
 from .line_detector import LineDetector
+from .line_modes import PAPER, PROGRAM
 from .line_parameters import PAPER_PIXEL
 from .rasters import Rasters
 from .segments import Segments
@@ -31,26 +32,19 @@ from .voting import cast_votes, longest_image_lines
 
 __all__ = ["Improved"]
 
+#: Least area per pixel of edge in test 6, pixels.
+_EDGE_PIXELS = 45.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Improved(LineDetector):
     """Line detector with texture of Awrangjeb, Zhang & Fraser (2011)."""
 
     name: ClassVar[str] = "improved"
-    #: "paper": every reading at its printed form, in pixels of the paper's images.
     modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "paper": {
-            "marking": "squares",
-            "neighbourhood": 0.75,
+            **PAPER,
             "curve_step": 0.1,
-            "missed_corner": 1000.0,
-            "vegetation": "pseudo-ndvi",
-            "extension_stop": 0.4,
-            "extension_part": 1000.0,
-            "inside_margin": 0.0,
-            "inside_share": 1.0,
-            "rise": 0.0,
-            "new_share": 0.0,
             "below_ground": 1.0,
             "entropy_threshold": 0.3,
             "adjustment": "longest",
@@ -58,6 +52,23 @@ class Improved(LineDetector):
             "texture_margin": 0.0,
             "edge_contrast": 0.0,
             "peak_ratio": 1.0,
+        },
+        # The program adjusts and votes on no line.
+        "program": {
+            **PROGRAM,
+            "entropy": "share",
+            "entropy_threshold": 0.3,
+            "entropy_offset": 1.0,
+            "green_extension": "same",
+            "vegetation_side": "inside",
+            "adjustment": "none",
+            "voting": False,
+            "texture_margin": 0.0,
+            # sqrt(2) px of the image, for 0.15 m.
+            "edge_blur": 1.41,
+            "edge_contrast": 0.0,
+            "peaks": "bins",
+            "area_per_edge": None,
         },
     }
 
@@ -70,6 +81,27 @@ class Improved(LineDetector):
         0.7, minimum=0, maximum=1, swept=(0.3, 0.6, 0.65, 0.7, 0.75, 0.8),
         doc="mean local entropy, as a share of its largest value, above which green areas are trees; 0.3 as printed",
         source="2011, 3.2; reading",
+    )  # fmt: skip
+    entropy: str = parameter(
+        "mean", choices=("mean", "share"),
+        doc="what `entropy_threshold` limits: the mean local entropy, or the share of pixels whose entropy is above "
+        "`entropy_level`",
+        source="2011, 3.2; program",
+    )  # fmt: skip
+    entropy_level: float = parameter(
+        0.8, minimum=0, maximum=1,
+        doc="entropy of a pixel that counts as high, from the least (0) to the greatest (1) value of the image",
+        source="program",
+    )  # fmt: skip
+    entropy_offset: float = parameter(
+        0.0, unit="m", minimum=0, doc="distance from a line at which the strip begins whose entropy is tested",
+        source="program",
+    )  # fmt: skip
+    green_extension: str = parameter(
+        "any", choices=("any", "same"),
+        doc="whether lines and rectangles extend over anything but trees, or green lines over smooth green and others "
+        "over what is not green",
+        source="program",
     )  # fmt: skip
     vegetation_side: str = parameter(
         "either", choices=("either", "inside"),
@@ -115,9 +147,15 @@ class Improved(LineDetector):
     most_edges: float = parameter(
         90.0, unit="m", minimum=0, doc="largest total length of edges in a building (tests 2 and 5)", source="2011, 3.4"
     )
-    area_per_edge: float = parameter(
-        4.5, unit="m", minimum=0, doc="least area per length of edges (test 6); 45 px of 0.1 m", source="2011, 3.4"
-    )
+    area_per_edge: float | None = parameter(
+        4.5, unit="m", minimum=0,
+        doc="least area per length of edges (test 6), 45 px of 0.1 m; none: 45 px of the image",
+        source="2011, 3.4; program",
+    )  # fmt: skip
+    peaks: str = parameter(
+        "maxima", choices=("maxima", "bins"),
+        doc="peaks of tests 1 and 3: local maxima, or any bins that are high enough", source="2011, 3.4; program",
+    )  # fmt: skip
     peak_ratio: float = parameter(
         2.0, minimum=0, swept=(1.0, 1.5, 2.0, 2.5),
         doc="least ratio of a peak of tests 1 and 3 to the mean bin; printed: well above it",
@@ -125,22 +163,29 @@ class Improved(LineDetector):
     )  # fmt: skip
 
     def _entropy(self, image: Image) -> NDArray[np.int32]:
-        prefix: NDArray[np.int32] = prefix_sums(local_entropy(grey_levels(image)))
+        entropy: NDArray[np.uint8] = local_entropy(grey_levels(image))
+        if self.entropy == "share" and entropy.size:
+            low, high = int(entropy.min()), int(entropy.max())
+            entropy = (entropy > low + self.entropy_level * (high - low)).astype(np.uint8)
+        prefix: NDArray[np.int32] = prefix_sums(entropy)
         return prefix
 
     def _entropy_limit(self) -> float:
-        return 255.0 * self.entropy_threshold
+        return self.entropy_threshold if self.entropy == "share" else 255.0 * self.entropy_threshold
+
+    def _same_kind(self) -> bool:
+        return self.green_extension == "same"
 
     def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        width = self.band_width / rasters.gsd
-        sides = [band(lines, width, 0.0)]
+        width, offset = self.band_width / rasters.gsd, self.entropy_offset / rasters.gsd
+        sides = [(band(lines, width, 0.0), band(lines, width + offset, -offset))]
         if self.vegetation_side == "either":
-            sides.append(band(lines, 0.0, width))
+            sides.append((band(lines, 0.0, width), band(lines, -offset, width + offset)))
         green, tree_edges = np.zeros(len(lines), dtype=np.bool_), np.zeros(len(lines), dtype=np.bool_)
-        for side in sides:
-            is_green = mean_in_boxes(rasters.cover.vegetation, side) > self.vegetation_threshold
+        for beside, farther in sides:
+            is_green = mean_in_boxes(rasters.cover.vegetation, beside) > self._index_limit(rasters.image)
             green |= is_green
-            tree_edges |= is_green & (mean_in_boxes(rasters.cover.entropy, side) > self._entropy_limit())
+            tree_edges |= is_green & (mean_in_boxes(rasters.cover.entropy, farther) > self._entropy_limit())
         return tree_edges, green
 
     def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
@@ -196,7 +241,8 @@ class Improved(LineDetector):
             margin=self.texture_margin,
             least=self.minimum_side,
             most_edges=self.most_edges,
-            area_per_edge=self.area_per_edge,
+            area_per_edge=_EDGE_PIXELS * grid.gsd if self.area_per_edge is None else self.area_per_edge,
             peak_ratio=self.peak_ratio,
+            any_bin=self.peaks == "bins",
         )
         return texture_of(candidates, edges, grid, rules)

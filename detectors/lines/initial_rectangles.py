@@ -7,6 +7,8 @@ Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.3.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,11 +16,32 @@ from ...core.kernels import kernel
 from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, length_inside, to_box
 from .extension import Cover, Growth, extend_rectangle
 
-__all__ = ["INSIDE", "TOO_NARROW", "initial_rectangles"]
+__all__ = ["INSIDE", "TOO_NARROW", "InitialRules", "initial_rectangles"]
 
 #: Codes of lines that made no rectangle; indices of rectangles are 0 or more.
 INSIDE = -1
 TOO_NARROW = -2
+
+
+class InitialRules(NamedTuple):
+    """Rules of initial rectangles; lengths in pixels.
+
+    Attributes
+    ----------
+    depth : float
+        Width of a rectangle before it is extended.
+    least_side : float
+        Least length and width; smaller rectangles are dropped.
+    margin : float
+        Distance outside a rectangle up to which a line counts as inside: an extension may end a step early.
+    inside_share : float
+        Least share of its length inside for a line whose midpoint is inside.
+    """
+
+    depth: float
+    least_side: float
+    margin: float
+    inside_share: float
 
 
 @kernel
@@ -39,28 +62,20 @@ def share_inside(line: NDArray[np.float64], box: NDArray[np.float64], margin: fl
 @kernel
 def initial_rectangles(
     cover: Cover,
-    rules: Growth,
+    growth: Growth,
+    rules: InitialRules,
     lines: NDArray[np.float64],
+    green: NDArray[np.bool_],
     order: NDArray[np.int64],
-    depth: float,
-    least_side: float,
-    margin: float,
-    inside_share: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return a rectangle extended from each line that is not yet inside one.
 
     Parameters
     ----------
+    green : ndarray of bool, shape (n,)
+        Whether vegetation is beside each line.
     order : ndarray of int64, shape (n,)
         Lines from the longest to the shortest.
-    depth : float
-        Width of the rectangle before it is extended, pixels.
-    least_side : float
-        A rectangle with a shorter side is dropped, pixels.
-    margin : float
-        Distance outside a rectangle up to which a line counts as inside, pixels: an extension may end a step early.
-    inside_share : float
-        Share of its length by which a line whose midpoint is inside counts as inside.
 
     Returns
     -------
@@ -74,15 +89,15 @@ def initial_rectangles(
     for i in order:
         inside = False
         for j in range(found):
-            if share_inside(lines[i], rectangles[j], margin) >= inside_share:
+            if share_inside(lines[i], rectangles[j], rules.margin) >= rules.inside_share:
                 inside = True
                 break
         if inside:
             continue
         box = lines[i].copy()
-        box[V0], box[V1] = 0.0, depth
-        box = extend_rectangle(cover, rules, box)
-        if min(box[U1] - box[U0], box[V1] - box[V0]) < least_side:
+        box[V0], box[V1] = 0.0, rules.depth
+        box = extend_rectangle(cover, growth, box, green[i])
+        if min(box[U1] - box[U0], box[V1] - box[V0]) < rules.least_side:
             made[i] = TOO_NARROW
         else:
             rectangles[found], made[i] = box, found

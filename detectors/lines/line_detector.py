@@ -7,25 +7,27 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
 from ...scenes.scene import Scene
 from ..steps import Step
 from .adjustment import by_length, rotate
-from .boxes import Boxes, box_corners, lengths, prefix_sums, widths
+from .boxes import UX, UY, Boxes, box_corners, lengths, prefix_sums, widths
 from .colours import Colours
 from .contours import trace_shapes
 from .corners import find_corners
 from .duplicates import find_duplicates
-from .extension import Cover, Growth, extend_lines, last_step
+from .extension import Cover, Growth, band, extend_lines, last_step, mean_in_boxes
 from .final_rectangles import FinalRules, final_rectangles
-from .initial_rectangles import INSIDE, TOO_NARROW, initial_rectangles
+from .initial_rectangles import INSIDE, TOO_NARROW, InitialRules, initial_rectangles
 from .line_parameters import PAPER_PIXEL, LineParameters
 from .line_steps import line_steps
-from .masks import build_masks, ground_correction, ground_heights, pulse_spacing
+from .masks import Masks, build_cell_masks, build_masks, ground_correction, ground_heights, pulse_spacing
 from .rasters import Rasters
 from .segments import Segments, beyond_coverage, fit_segments, inside_first
 from .trace import Adjusted, Outcome, Trace, Votes
@@ -56,9 +58,10 @@ class LineDetector(LineParameters):
 
     def run(self, rasters: Rasters) -> Trace:
         """Run all steps that follow the masks, keeping the intermediate results."""
-        segments, on_border = self._fitted_lines(rasters)
+        segments, outcomes = self._fitted_lines(rasters)
         tree_edges, green = self._tree_edges(rasters, segments.lines)
-        outcomes = np.where(on_border, Outcome.BORDER, np.where(tree_edges, Outcome.VEGETATION, Outcome.RECTANGLE))
+        smooth_green = green & ~tree_edges & (outcomes == Outcome.RECTANGLE)
+        outcomes = np.where((outcomes == Outcome.RECTANGLE) & tree_edges, Outcome.VEGETATION, outcomes)
 
         rotation = np.full(len(segments), np.nan)
         remaining = np.flatnonzero(outcomes == Outcome.RECTANGLE)
@@ -66,7 +69,7 @@ class LineDetector(LineParameters):
         outcomes[remaining[np.isnan(rotation[remaining])]] = Outcome.UNADJUSTED
         remaining = np.flatnonzero(outcomes == Outcome.RECTANGLE)
         lines = segments.lines.copy()
-        lines[remaining] = self._extended(rasters, rotate(lines[remaining], rotation[remaining]))
+        lines[remaining] = self._extended(rasters, rotate(lines[remaining], rotation[remaining]), green[remaining])
 
         edges = self._image_edges(rasters)
         adjusted = Adjusted(lines, segments.shapes, rotation, outcomes == Outcome.RECTANGLE)
@@ -74,7 +77,7 @@ class LineDetector(LineParameters):
         if votes is not None:
             outcomes[adjusted.remaining & ~self._majority(votes)] = Outcome.OUTVOTED
         remaining = np.flatnonzero(outcomes == Outcome.RECTANGLE)
-        initial, made = self._initial_rectangles(rasters, lines[remaining])
+        initial, made = self._initial_rectangles(rasters, lines[remaining], green[remaining])
         outcomes[remaining[made == INSIDE]] = Outcome.INSIDE
         outcomes[remaining[made == TOO_NARROW]] = Outcome.NARROW
         candidates, candidate_of = self._final_rectangles(rasters, initial)
@@ -92,7 +95,7 @@ class LineDetector(LineParameters):
             lines=lines,
             shapes=segments.shapes,
             outcomes=outcomes,
-            smooth_green=green & ~tree_edges & ~on_border,
+            smooth_green=smooth_green,
             initial=initial,
             candidate_of=candidate_of,
             candidates=candidates,
@@ -154,18 +157,26 @@ class LineDetector(LineParameters):
         ground = ground_heights(points, surface, method=self.ground, tile_side=tile_side)
         if self.ground == "point-dem" and self.below_ground < 1 and len(points):
             ground += ground_correction(points, ground, self.below_ground)
-        masks = build_masks(
-            points,
-            ground + self.height,
-            grid,
-            neighbourhood=1.5 * spacing if self.neighbourhood is None else self.neighbourhood,
-            nearest=self.marking == "nearest",
-            clip=self.border == "drop",
-        )
+        masks = self._masks(points, ground + self.height, grid, spacing)
         cover = Cover(prefix_sums(masks.primary), vegetation_prefix(image, self.vegetation), self._entropy(image))
         bands = [image.bands.index(name) for name in ("red", "green", "blue")]
         rgb = image.values[:3] if bands == [0, 1, 2] else image.values[bands]
-        return Rasters(image, masks, cover, Colours(rgb, float(np.iinfo(rgb.dtype).max)), spacing)
+        if self.colour_smoothing > 0:
+            rgb = np.stack([cv2.GaussianBlur(band, (3, 3), self.colour_smoothing) for band in rgb])
+        colours = Colours(rgb, float(np.iinfo(rgb.dtype).max), self.colour_bins == "tenths")
+        return Rasters(image, masks, cover, colours, spacing)
+
+    def _masks(self, points: PointCloud, thresholds: NDArray[np.float64], grid: Grid, spacing: float) -> Masks:
+        clip = self.border == "drop"
+        if self.marking == "cells":
+            return build_cell_masks(points, thresholds, grid, spacing=spacing, clip=clip)
+        side = 1.5 * spacing if self.neighbourhood is None else self.neighbourhood
+        return build_masks(points, thresholds, grid, neighbourhood=side, nearest=self.marking == "nearest", clip=clip)
+
+    def _index_limit(self, image: Image) -> float:
+        """Return the threshold of the vegetation index of an image."""
+        chosen = self.nir_threshold if "nir" in image.bands else None
+        return self.vegetation_threshold if chosen is None else chosen
 
     def _entropy(self, image: Image) -> NDArray[np.int32]:
         return _NO_ENTROPY
@@ -178,15 +189,19 @@ class LineDetector(LineParameters):
             least_step=max(stop / rasters.gsd, 1.0),
             black_share=self.extension_black,
             part=part / rasters.gsd,
-            vegetation=self.vegetation_threshold,
+            vegetation=self._index_limit(rasters.image),
             entropy=self._entropy_limit(),
+            same_kind=self._same_kind(),
         )
 
     def _entropy_limit(self) -> float:
         return 0.0
 
-    def _fitted_lines(self, rasters: Rasters) -> tuple[Segments, NDArray[np.bool_]]:
-        """Return the lines around the black shapes, and which of them are on the border of the points or the image."""
+    def _same_kind(self) -> bool:
+        return False
+
+    def _fitted_lines(self, rasters: Rasters) -> tuple[Segments, NDArray[np.int64]]:
+        """Return the lines around the black shapes, and their outcomes so far."""
         gsd = rasters.gsd
         black = rasters.masks.primary
         curves = trace_shapes(black, shortest=self.minimum_side, gsd=gsd, sample=self._sample(rasters))
@@ -202,38 +217,56 @@ class LineDetector(LineParameters):
         )
         reach = max(1.0, self.inside_reach * PAPER_PIXEL / gsd)
         lines = inside_first(segments.lines, black, reach=reach, outset=_OUTSET)
-        on_border = beyond_coverage(lines, rasters.masks.coverage, reach) & (self.border == "drop")
-        return Segments(lines, segments.shapes), on_border
+        outcomes = np.full(len(lines), Outcome.RECTANGLE, dtype=np.int64)
+        if self.inside_test == "strip":
+            lines, has_side = self._directed(rasters, lines)
+            outcomes[~has_side] = Outcome.NO_SIDE
+        if self.border == "drop":
+            outcomes[beyond_coverage(lines, rasters.masks.coverage, reach)] = Outcome.BORDER
+        return Segments(lines, segments.shapes), outcomes
 
-    def _initial_rectangles(self, rasters: Rasters, lines: Boxes) -> tuple[Boxes, NDArray[np.int64]]:
+    def _directed(self, rasters: Rasters, lines: Boxes) -> tuple[Boxes, NDArray[np.bool_]]:
+        """Return the lines directed towards the strip that is black, and which of them have one."""
+        width = self.band_width / rasters.gsd
+        inner = mean_in_boxes(rasters.cover.black, band(lines, width, 0.0))
+        outer = mean_in_boxes(rasters.cover.black, band(lines, 0.0, width))
+        directed = lines.copy()
+        directed[outer > inner, UX : UY + 1] *= -1
+        return directed, np.maximum(inner, outer) >= self.extension_black
+
+    def _initial_rectangles(
+        self, rasters: Rasters, lines: Boxes, green: NDArray[np.bool_]
+    ) -> tuple[Boxes, NDArray[np.int64]]:
         """Return the initial rectangles, and the index of the one of each line, `INSIDE` or `TOO_NARROW`."""
         gsd, growth = rasters.gsd, self._growth(rasters)
-        initial, made = initial_rectangles(
-            rasters.cover,
-            growth,
-            lines,
-            by_length(lines),
-            self.initial_width / gsd,
-            self.minimum_side / gsd,
-            last_step(growth) + 1.0 if self.inside_margin is None else self.inside_margin / gsd,
-            self.inside_share,
+        rules = InitialRules(
+            depth=self.initial_width / gsd,
+            least_side=(self.minimum_side if self.least_rectangle is None else self.least_rectangle) / gsd,
+            margin=last_step(growth) + 1.0 if self.inside_margin is None else self.inside_margin / gsd,
+            inside_share=self.inside_share,
         )
+        initial, made = initial_rectangles(rasters.cover, growth, rules, lines, green, by_length(lines))
         return initial, made
 
     def _final_rectangles(self, rasters: Rasters, initial: Boxes) -> tuple[Boxes, NDArray[np.int64]]:
         """Return the final rectangles, and the index of the one of each initial rectangle, or `DROPPED`."""
         gsd = rasters.gsd
+        strip = max(self.strip / gsd, self.least_strip)
         rules = FinalRules(
             reduction=self.reduction,
             part_share=self.part_share,
             total_share=self.total_share,
-            strip=max(self.strip / gsd, self.least_strip),
-            least_strip=min(1.0, self.least_strip),
+            strip=strip,
+            # The first strip is tried in any case.
+            least_strip=min(1.0 if self.strip_stop is None else self.strip_stop / gsd, strip),
             colour_share=self.colour_similarity,
             black_share=self.black_share,
             gap_share=self.gap_share,
             rise=self.rise,
             whole_initial=self.compare == "whole",
+            filled_share=self.filled_share,
+            independent=self.final_order == "independent",
+            rises_after_gap=self.rise_from == "gap",
         )
         longest_first = np.argsort(-np.maximum(lengths(initial), widths(initial)), kind="stable")
         final, final_of = final_rectangles(
@@ -246,6 +279,7 @@ class LineDetector(LineParameters):
             return self.curve_step
         return max(_CURVE_STEP * rasters.spacing, rasters.gsd / 3)
 
-    def _extended(self, rasters: Rasters, lines: Boxes) -> Boxes:
-        extended: Boxes = extend_lines(rasters.cover, self._growth(rasters), lines, self.extension / rasters.gsd)
+    def _extended(self, rasters: Rasters, lines: Boxes, green: NDArray[np.bool_]) -> Boxes:
+        depth = self.extension / rasters.gsd
+        extended: Boxes = extend_lines(rasters.cover, self._growth(rasters), lines, depth, green)
         return extended

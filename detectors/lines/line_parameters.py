@@ -29,9 +29,9 @@ class LineParameters(Detector):
     requires: ClassVar[tuple[str, ...]] = ("points", "colour")
 
     mode: str = parameter(
-        "default", choices=("default", "paper"),
-        doc="set of defaults: the readings that detect best, or each point as printed; parameters given beside it "
-        "override it",
+        "default", choices=("default", "paper", "program"),
+        doc="set of defaults: the readings that detect best, each point as printed, or as in the authors' own program; "
+        "parameters given beside it override it",
     )  # fmt: skip
     ground: str = parameter(
         "tile-dem",
@@ -57,9 +57,10 @@ class LineParameters(Detector):
         2.5, unit="m", minimum=0, doc="least height above ground of a building", source="2010, 3.2"
     )
     marking: str = parameter(
-        "nearest", choices=("nearest", "squares"),
-        doc="how points mark the masks: the nearest point decides, or each point marks a square, as printed",
-        source="2010, 3.2; reading",
+        "nearest", choices=("nearest", "squares", "cells"),
+        doc="how points mark the masks: the nearest point decides; each point marks a square, as printed, or a square "
+        "of cells of 0.25 m whatever the image",
+        source="2010, 3.2; reading; program",
     )  # fmt: skip
     neighbourhood: float | None = parameter(
         None, unit="m", minimum=0,
@@ -106,10 +107,22 @@ class LineParameters(Detector):
         doc="distance of the inside point from its line",
         source="2010, 3.3.1; reading",
     )
+    inside_test: str = parameter(
+        "point", choices=("point", "strip"),
+        doc="side of a line with the building: where the inside point is black, or a share `extension_black` of the "
+        "strip of `band_width`; lines without one are dropped",
+        source="2010, 3.3.1; program",
+    )  # fmt: skip
     vegetation: str = parameter(
-        "green-red", choices=("green-red", "pseudo-ndvi"),
-        doc="index on images without near infrared: 2(G-R)/(G+R), or the printed (R-G)/(R+G)",
-        source="2010, 4.3; reading",
+        "green-red", choices=("green-red", "pseudo-ndvi", "sigma"),
+        doc="index on images without near infrared: 2(G-R)/(G+R), the printed (R-G)/(R+G), or its standard deviation "
+        "by the noise of the image, 0..100",
+        source="2010, 4.3; reading; program",
+    )  # fmt: skip
+    nir_threshold: float | None = parameter(
+        None, minimum=0, maximum=255, doc="threshold of the NDVI (0..255) with near infrared; none: "
+        "`vegetation_threshold`",
+        source="program",
     )  # fmt: skip
     vegetation_threshold: float = parameter(
         48.0, minimum=0, maximum=255, swept=(32, 40, 48, 56, 64),
@@ -160,9 +173,27 @@ class LineParameters(Detector):
         doc="least share of its length inside a rectangle for a line to count as inside, with its midpoint",
         source="2010, 3.3.3; reading",
     )  # fmt: skip
+    least_rectangle: float | None = parameter(
+        None, unit="m", minimum=0, doc="least length and width of an initial rectangle; none: `minimum_side`",
+        source="2010, 3.3.3; program",
+    )  # fmt: skip
     reduction: float = parameter(
         0.15, minimum=0, maximum=0.9, swept=(0.10, 0.15, 0.20, 0.25, 0.30),
         doc="share by which length and width of initial rectangles shrink", source="2010, 3.4.1 and 4.4.1",
+    )  # fmt: skip
+    filled_share: float = parameter(
+        0.0, minimum=0, maximum=1,
+        doc="least share of a shrunk initial rectangle that is black in the secondary mask; 0: not tested, as printed",
+        source="program",
+    )  # fmt: skip
+    colour_bins: str = parameter(
+        "printed", choices=("printed", "tenths"),
+        doc="bins of the colour histograms: 10 of Y, 20 of I and Q, or 0.1 wide for all three",
+        source="2010, 3.4.1; program",
+    )  # fmt: skip
+    colour_smoothing: float = parameter(
+        0.0, unit="px", minimum=0, maximum=5, doc="sigma of the Gaussian over 3 x 3 pixels that smooths the colours",
+        source="program",
     )  # fmt: skip
     part_share: float = parameter(
         0.97,
@@ -180,6 +211,16 @@ class LineParameters(Detector):
     least_strip: float = parameter(
         2.0, unit="px", minimum=0.1, doc="least first step of the final extension on coarse images", source="reading"
     )
+    strip_stop: float | None = parameter(
+        None, unit="m", minimum=0.01,
+        doc="strip below which the final extension of a side ends; none: one pixel, as printed",
+        source="2010, 3.4.2; program",
+    )  # fmt: skip
+    final_order: str = parameter(
+        "sequence", choices=("sequence", "independent"),
+        doc="whether each side is extended from what the sides before it reached, or all from the same rectangle",
+        source="2010, 3.4.2; program",
+    )  # fmt: skip
     colour_similarity: float = parameter(
         0.4, minimum=0, maximum=1, swept=(0.2, 0.3, 0.4, 0.5, 0.6),
         doc="least share of a step in the dominant range of Y, I and Q each", source="2010, 3.4.2 and 4.4.1",
@@ -198,6 +239,11 @@ class LineParameters(Detector):
     rise: float = parameter(
         0.1, minimum=0, maximum=1, doc="largest increase of primary black that is no rise; 0 as printed",
         source="2010, 3.4.2; reading",
+    )  # fmt: skip
+    rise_from: str = parameter(
+        "start", choices=("start", "gap"),
+        doc="whether primary black must never rise, as printed, or not after it fell below `gap_share`",
+        source="2010, 3.4.2; program",
     )  # fmt: skip
     compare: str = parameter(
         "shrunk", choices=("shrunk", "whole"),

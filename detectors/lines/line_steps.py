@@ -40,6 +40,7 @@ _ROLES = {
     Outcome.UNADJUSTED: Role.CANDIDATE,
     Outcome.OUTVOTED: Role.REMOVED,
     Outcome.BORDER: Role.BORDER,
+    Outcome.NO_SIDE: Role.INPUT,
 }
 _DROPPED = (Outcome.VEGETATION, Outcome.UNADJUSTED, Outcome.OUTVOTED, Outcome.NARROW)
 #: Histograms shown of each kind of candidates, kept and dropped, the largest ones.
@@ -139,7 +140,7 @@ def _fitted_lines(trace: Trace) -> Iterator[Layer]:
             yield LineLayer(_lines(trace, trace.fitted[chosen]), outcome.label, role, marked=outcome in _DROPPED)
     if trace.smooth_green.any():
         places = _places(trace, box_centres(trace.fitted[trace.smooth_green]))
-        yield MarkerLayer(places, "kept by its low entropy", Role.INPUT, "diamond")
+        yield MarkerLayer(places, "kept by its low entropy", Role.ADDED, "diamond")
 
 
 def _voted_lines(trace: Trace, votes: NDArray[np.float64]) -> Iterator[Layer]:

@@ -38,7 +38,7 @@ from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
 
-__all__ = ["Masks", "build_masks", "ground_correction", "ground_heights", "pulse_spacing"]
+__all__ = ["Masks", "build_cell_masks", "build_masks", "ground_correction", "ground_heights", "pulse_spacing"]
 
 #: Side of the cells in which points are counted to tell coverage and density, metres.
 _COVERAGE_CELL = 2.5
@@ -52,6 +52,8 @@ _BARE = 4.0
 _BAND = 512
 #: Distance between successive bins of the height histogram of a tile (conference version), metres.
 _HEIGHT_BIN = 2.0
+#: Side of the cells of masks that do not follow the image, metres.
+_MASK_CELL = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,3 +249,36 @@ def build_masks(
     if clip:
         primary &= coverage
     return Masks(primary, secondary, coverage, side)
+
+
+def build_cell_masks(
+    points: PointCloud, thresholds: NDArray[np.float64], grid: Grid, *, spacing: float, clip: bool = True
+) -> Masks:
+    """Return both masks made of squares on cells of 0.25 m, resampled to the grid of the image.
+
+    A point marks 3 x 3 cells at a spacing of 0.5 m and 7 x 7 at 1 m: half the side is
+    max(0.5, 0.5 floor(2 spacing + 0.5)) / 0.25 - 1 cells, as in the authors' own program.
+
+    Parameters
+    ----------
+    thresholds : ndarray, shape (n,)
+        Height threshold of each point, metres; a point without one (NaN) marks nothing.
+    spacing : float
+        Point spacing, metres.
+    clip : bool
+        Whether the primary mask is white outside the coverage.
+    """
+    scale = grid.gsd / _MASK_CELL
+    cells = Grid(grid.west, grid.north, _MASK_CELL, math.ceil(grid.rows * scale), math.ceil(grid.columns * scale))
+    side = 2 * round(max(0.5, 0.5 * math.floor(2 * spacing + 0.5)) / _MASK_CELL - 1) + 1
+    rows = ((np.arange(grid.rows) + 0.5) * scale).astype(np.intp)
+    columns = ((np.arange(grid.columns) + 0.5) * scale).astype(np.intp)
+    white, secondary = (
+        _squares(_hits(points, chosen, cells), side)[np.ix_(rows, columns)]
+        for chosen in (points.z < thresholds, points.z > thresholds)
+    )
+    coverage = _coverage(points, grid)
+    primary = np.subtract(1, white, dtype=np.uint8)
+    if clip:
+        primary &= coverage
+    return Masks(primary, secondary, coverage, 2 * round((side * _MASK_CELL / grid.gsd - 1) / 2) + 1)

@@ -19,6 +19,7 @@ from .adjustment import adjust_to_neighbours
 from .boxes import Boxes
 from .extension import band, mean_in_boxes
 from .line_detector import LineDetector
+from .line_modes import PAPER, PROGRAM
 from .rasters import Rasters
 from .segments import Segments
 
@@ -30,29 +31,16 @@ class Original(LineDetector):
     """Line detector of Awrangjeb, Ravanbakhsh & Fraser (2010)."""
 
     name: ClassVar[str] = "original"
-    #: "paper": every reading at its printed form, in pixels of the paper's images.
     modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "paper": {
-            "marking": "squares",
-            "neighbourhood": 0.75,
-            "curve_step": 0.15,
-            "missed_corner": 1000.0,
-            "vegetation": "pseudo-ndvi",
-            "adjustment_reference": "any",
-            "adjustment_share": 1.0,
-            "extension_stop": 0.4,
-            "extension_part": 1000.0,
-            "inside_margin": 0.0,
-            "inside_share": 1.0,
-            "rise": 0.0,
-            "new_share": 0.0,
-        },
+        "paper": {**PAPER, "curve_step": 0.15, "adjustment_reference": "any", "adjustment_share": 1.0},
+        "program": {**PROGRAM, "adjustment_reference": "none"},
     }
 
     adjustment_reference: str = parameter(
-        "longer", choices=("longer", "any"),
-        doc="reference lines of the adjustment: longer ones (the print sorts by length), or all nearby ones",
-        source="2010, 3.3.2; reading",
+        "longer", choices=("longer", "any", "none"),
+        doc="reference lines of the adjustment: longer ones (the print sorts by length), all nearby ones, or none: "
+        "lines stay as fitted",
+        source="2010, 3.3.2; reading; program",
     )  # fmt: skip
     adjustment_share: float = parameter(
         0.5, minimum=0, maximum=1,
@@ -62,10 +50,12 @@ class Original(LineDetector):
 
     def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         beside = mean_in_boxes(rasters.cover.vegetation, band(lines, self.band_width / rasters.gsd, 0.0))
-        green = beside > self.vegetation_threshold
+        green = beside > self._index_limit(rasters.image)
         return green, green
 
     def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
+        if self.adjustment_reference == "none":
+            return np.zeros(len(segments))
         return adjust_to_neighbours(
             segments.lines,
             radius=self.adjustment_radius / gsd,

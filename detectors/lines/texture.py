@@ -77,6 +77,8 @@ class TextureRules(NamedTuple):
         Least area per length of edges of T6, metres.
     peak_ratio : float
         Least ratio of a peak of T1 and T3 to the mean bin.
+    any_bin : bool
+        Whether any bins that are high enough, and not only local maxima, are peaks of T1 and T3.
     """
 
     margin: float
@@ -84,6 +86,7 @@ class TextureRules(NamedTuple):
     most_edges: float
     area_per_edge: float
     peak_ratio: float
+    any_bin: bool = False
 
 
 class _EdgePoints(NamedTuple):
@@ -240,12 +243,12 @@ def apply_tests(
     passed[:, 4] = (strongest >= least) & (total <= most_edges)
     passed[:, 5] = areas >= rules.area_per_edge * total
     for i in np.flatnonzero(highest >= 2 * least):
-        peaks = find_peaks(collective[i], rules.peak_ratio)
+        peaks = np.arange(BIN_COUNT) if rules.any_bin else find_peaks(collective[i], rules.peak_ratio)
         heights = collective[i, peaks]
         passed[i, 2] = (heights >= 2 * least).sum() >= 2 and highest[i] >= 3 * mean[i]
         high = peaks[heights >= 3 * least]
         passed[i, 0] = any(
-            collective[i, a + 1 : b].mean() < 2 * least for n, a in enumerate(high) for b in high[n + 1 :]
+            b > a + 1 and collective[i, a + 1 : b].mean() < 2 * least for n, a in enumerate(high) for b in high[n + 1 :]
         )
     return passed
 

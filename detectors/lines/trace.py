@@ -33,6 +33,7 @@ class Outcome(IntEnum):
     OUTVOTED = 4, "outvoted"
     INSIDE = 5, "inside another line's rectangle"
     NARROW = 6, "rectangle with a side under the minimum"
+    NO_SIDE = 7, "no building on either side"
 
     label: str
 

@@ -13,10 +13,21 @@ PRINTED = (
     "marking=squares,neighbourhood=0.75,missed_corner=1000,vegetation=pseudo-ndvi,extension_stop=0.4,"
     "extension_part=1000,inside_margin=0,inside_share=1,rise=0,new_share=0"
 )
+PROGRAM = (
+    "ground=point-dem,below_ground=1,marking=cells,neighbourhood=0.75,curve_step=0.25,missed_corner=1000,"
+    "inside_test=strip,band_width=2,vegetation=sigma,nir_threshold=25.5,extension_stop=0.4,extension_part=1000,"
+    "inside_margin=0,inside_share=1,least_rectangle=2,reduction=0.3,filled_share=0.7,colour_bins=tenths,"
+    "colour_smoothing=0.5,strip_stop=0.35,final_order=independent,rise_from=gap,rise=0,new_share=0"
+)
+#: (detector, mode) to the parameters that the mode sets.
 LONG_FORM = {
-    "original": f"{PRINTED},curve_step=0.15,adjustment_reference=any,adjustment_share=1",
-    "improved": f"{PRINTED},curve_step=0.1,below_ground=1,entropy_threshold=0.3,adjustment=longest,"
+    ("original", "paper"): f"{PRINTED},curve_step=0.15,adjustment_reference=any,adjustment_share=1",
+    ("improved", "paper"): f"{PRINTED},curve_step=0.1,below_ground=1,entropy_threshold=0.3,adjustment=longest,"
     "vote_length=printed,texture_margin=0,edge_contrast=0,peak_ratio=1",
+    ("original", "program"): f"{PROGRAM},adjustment_reference=none",
+    ("improved", "program"): f"{PROGRAM},entropy=share,entropy_threshold=0.3,entropy_offset=1,green_extension=same,"
+    "vegetation_side=inside,adjustment=none,voting=false,texture_margin=0,edge_blur=1.41,edge_contrast=0,peaks=bins,"
+    "area_per_edge=none",
 }
 
 
@@ -24,21 +35,21 @@ def found_in(scene, selection):
     return make_detector(selection).detect(scene, np.random.default_rng(0))
 
 
-@pytest.mark.parametrize("name", list(LONG_FORM))
-def test_the_paper_mode_detects_what_its_long_form_detects(name):
+@pytest.mark.parametrize(("name", "mode"), list(LONG_FORM))
+def test_a_mode_detects_what_its_long_form_detects(name, mode):
     builder = SceneBuilder().house(rectangle(20, 30, 15, 10, 30)).tree(15, 10, 5)
     scene = builder.house(rectangle(45, 30, 12, 8, 70), GREEN_ROOF).build().for_detection()
-    short, long = found_in(scene, f"{name}[mode=paper]"), found_in(scene, f"{name}[{LONG_FORM[name]}]")
-    assert len(short) > 0
+    short, long = found_in(scene, f"{name}[mode={mode}]"), found_in(scene, f"{name}[{LONG_FORM[name, mode]}]")
+    assert short.metadata["initial rectangles"] > 0
     assert shapely.to_wkb(short.polygons).tolist() == shapely.to_wkb(long.polygons).tolist()
     assert short.metadata == long.metadata
     assert short.metadata != found_in(scene, name).metadata
 
 
-@pytest.mark.parametrize("name", list(LONG_FORM))
-def test_the_paper_mode_and_its_long_form_differ_in_their_mode_only(name):
-    short, long = make_detector(f"{name}[mode=paper]"), make_detector(f"{name}[{LONG_FORM[name]}]")
-    assert short.values() == {**long.values(), "mode": "paper"}
+@pytest.mark.parametrize(("name", "mode"), list(LONG_FORM))
+def test_a_mode_and_its_long_form_differ_in_their_mode_only(name, mode):
+    short, long = make_detector(f"{name}[mode={mode}]"), make_detector(f"{name}[{LONG_FORM[name, mode]}]")
+    assert short.values() == {**long.values(), "mode": mode}
 
 
 def test_label_and_key_hold_what_overrides_a_mode():

@@ -16,9 +16,16 @@ from roofbench.detectors.lines.final_rectangles import (
     shrink,
     strip_shares,
 )
-from roofbench.detectors.lines.initial_rectangles import INSIDE, TOO_NARROW, initial_rectangles, share_inside
+from roofbench.detectors.lines.initial_rectangles import (
+    INSIDE,
+    TOO_NARROW,
+    InitialRules,
+    initial_rectangles,
+    share_inside,
+)
 
 NONE = np.zeros((0, 1), dtype=np.int32)
+NOT_GREEN = np.zeros(1, dtype=np.bool_)
 RULES = Growth(step=20.0, least_step=2.7, black_share=0.7, part=20.0, vegetation=48.0, entropy=0.0)
 
 
@@ -82,7 +89,7 @@ def test_rotating_turns_a_line_about_its_centre():
 def test_a_line_is_extended_to_within_a_least_step_of_the_end_of_the_black():
     black = np.zeros((100, 200), np.uint8)
     black[20:80, 30:170] = 1
-    found = extend_lines(cover(black), RULES, line(100, 20, 0, 40)[None], 20.0)[0]
+    found = extend_lines(cover(black), RULES, line(100, 20, 0, 40)[None], 20.0, NOT_GREEN)[0]
     assert 100 + found[U0] == pytest.approx(30, abs=2.7)
     assert 100 + found[U1] == pytest.approx(170, abs=2.7)
 
@@ -94,8 +101,8 @@ def test_a_side_stops_at_a_court_that_takes_less_than_a_third_of_it():
     box = line(70, 20, 0, 100)
     box[V1] = 10.0
     in_parts, as_a_whole = box.copy(), box.copy()
-    in_parts = extend_rectangle(cover(black), RULES, in_parts)
-    as_a_whole = extend_rectangle(cover(black), RULES._replace(part=1e6), as_a_whole)
+    in_parts = extend_rectangle(cover(black), RULES, in_parts, False)
+    as_a_whole = extend_rectangle(cover(black), RULES._replace(part=1e6), as_a_whole, False)
     assert 20 + in_parts[V1] == pytest.approx(60, abs=2.7)
     assert 20 + as_a_whole[V1] == pytest.approx(100, abs=2.7)
 
@@ -107,14 +114,14 @@ def test_extension_stops_at_vegetation_unless_its_texture_is_smooth():
     leaves[:, 130:] = 100
     rough[:, 130:] = 200
     start = line(100, 20, 0, 40)[None]
-    assert extend_lines(cover(black, leaves), RULES, start, 20.0)[0, U1] < 45
+    assert extend_lines(cover(black, leaves), RULES, start, 20.0, NOT_GREEN)[0, U1] < 45
     textured = RULES._replace(entropy=128.0)
-    assert extend_lines(cover(black, leaves, rough), textured, start, 20.0)[0, U1] < 45
-    assert extend_lines(cover(black, leaves, 0 * rough), textured, start, 20.0)[0, U1] > 60
+    assert extend_lines(cover(black, leaves, rough), textured, start, 20.0, NOT_GREEN)[0, U1] < 45
+    assert extend_lines(cover(black, leaves, 0 * rough), textured, start, 20.0, NOT_GREEN)[0, U1] > 60
 
 
 def test_a_strip_beyond_the_image_is_white():
-    found = extend_lines(cover(np.ones((50, 50), np.uint8)), RULES, line(25, 0, 0, 20)[None], 20.0)[0]
+    found = extend_lines(cover(np.ones((50, 50), np.uint8)), RULES, line(25, 0, 0, 20)[None], 20.0, NOT_GREEN)[0]
     assert found[U1] <= 25 + 0.3 * 20
 
 
@@ -123,7 +130,7 @@ def test_a_rectangle_grows_over_the_whole_black_shape():
     black[20:80, 30:170] = 1
     box = line(100, 20, 0, 40)
     box[V1] = 10
-    box = extend_rectangle(cover(black), RULES, box)
+    box = extend_rectangle(cover(black), RULES, box, False)
     assert (box[V0], box[V1]) == (0, pytest.approx(60, abs=2.7))
     assert box[U1] - box[U0] == pytest.approx(140, abs=5.4)
 
@@ -133,7 +140,9 @@ def test_the_longest_line_makes_the_rectangle_and_the_others_are_inside_it():
     black[20:80, 30:170] = 1
     lines = np.array([line(100, 20, 0, 130), line(100, 80, 180, 120), line(170, 50, 90, 50), line(100, 10, 180, 30)])
     order = np.arange(4)
-    found, made = initial_rectangles(cover(black), RULES, lines, order, 10.0, 20.0, 3.0, 0.75)
+    found, made = initial_rectangles(
+        cover(black), RULES, InitialRules(10.0, 20.0, 3.0, 0.75), lines, np.zeros(len(lines), bool), order
+    )
     assert len(found) == 1
     assert made.tolist() == [0, INSIDE, INSIDE, TOO_NARROW]
 
