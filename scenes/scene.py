@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 import shapely
@@ -22,7 +22,7 @@ from .geodata.raster import Elevation, Grid, Image
 if TYPE_CHECKING:
     from .ground.heights import Heights
 
-__all__ = ["Scene"]
+__all__ = ["Layers", "Scene"]
 
 #: What a detector may require, and how it is named to people.
 INPUTS: Mapping[str, str] = {
@@ -32,6 +32,19 @@ INPUTS: Mapping[str, str] = {
     "nir": "orthoimage with a near-infrared band",
     "dem": "bare-earth DEM",
 }
+
+
+class Layers(TypedDict, total=False):
+    """The layers of a scene: each the value, or a function without arguments that reads it when it is first used."""
+
+    points: PointCloud | Callable[[], PointCloud | None] | None
+    image: Image | Callable[[], Image | None] | None
+    dem: Elevation | Callable[[], Elevation | None] | None
+    reference: Footprints | Callable[[], Footprints | None] | None
+    area: shapely.Geometry | Callable[[], shapely.Geometry | None] | None
+
+
+_LAYERS = tuple(Layers.__annotations__)
 
 
 class Scene:
@@ -45,7 +58,7 @@ class Scene:
     crs : str, optional
         Authority code or WKT.
     points, image, dem, reference, area
-        The value, or a function without arguments that reads it when it is first asked for, or None.
+        Layers: the value, or a function without arguments that reads it when it is first used, or None.
     content_hash : str or function, optional
         Digest of everything the scene holds; computed from the arrays when not given.
     facts : mapping, optional
@@ -58,13 +71,9 @@ class Scene:
         extent: tuple[float, float, float, float],
         *,
         crs: str | None = None,
-        points: PointCloud | Callable[[], PointCloud | None] | None = None,
-        image: Image | Callable[[], Image | None] | None = None,
-        dem: Elevation | Callable[[], Elevation | None] | None = None,
-        reference: Footprints | Callable[[], Footprints | None] | None = None,
-        area: shapely.Geometry | Callable[[], shapely.Geometry | None] | None = None,
         content_hash: str | Callable[[], str] | None = None,
         facts: Mapping[str, Any] | None = None,
+        **layers: Unpack[Layers],
     ) -> None:
         xmin, ymin, xmax, ymax = map(float, extent)
         if not (xmax > xmin and ymax > ymin):
@@ -73,13 +82,10 @@ class Scene:
         self.extent = (xmin, ymin, xmax, ymax)
         self.crs = crs
         self.facts = dict(facts or {})
-        self._sources: dict[str, Any] = {
-            "points": points,
-            "image": image,
-            "dem": dem,
-            "reference": reference,
-            "area": area,
-        }
+        unknown = sorted(set(layers) - set(_LAYERS))
+        if unknown:
+            raise TypeError(f"Scene() has no layer {unknown[0]!r}: there are {', '.join(_LAYERS)}")
+        self._sources: dict[str, Any] = {name: layers.get(name) for name in _LAYERS}
         self._content_hash = content_hash
         self._heights: Heights | None = None
         self._is_for_detection = False

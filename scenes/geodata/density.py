@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from .raster import Grid
+from .raster import Frame, Grid
 
 __all__ = ["Statistic", "point_counts", "point_spacing", "spacing_of_counts"]
 
@@ -63,7 +63,7 @@ def point_spacing(
 def point_counts(x: _Coordinates, y: _Coordinates, grid: Grid) -> NDArray[np.int64]:
     """Return the number of points in each cell of a grid, shape (rows, columns); points not finite lie in none."""
     counts = np.zeros(grid.shape, dtype=np.int64)
-    _count(x, y, grid.west, grid.north, grid.gsd, counts)
+    _count(x, y, grid.frame, counts)
     return counts
 
 
@@ -81,10 +81,9 @@ def spacing_of_counts(counts: NDArray[np.int64], square: float, statistic: Stati
 
 
 @kernel
-def _count(x: _Coordinates, y: _Coordinates, west: float, north: float, side: float, counts: NDArray[np.int64]) -> None:
+def _count(x: _Coordinates, y: _Coordinates, frame: Frame, counts: NDArray[np.int64]) -> None:
     """Add the points to the counts of their squares, shape (rows, columns)."""
-    rows, columns = counts.shape
     for i in range(len(x)):
-        column, row = (x[i] - west) / side, (north - y[i]) / side
-        if 0 <= column < columns and 0 <= row < rows:
+        column, row = (x[i] - frame.west) / frame.gsd, (frame.north - y[i]) / frame.gsd
+        if 0 <= column < frame.columns and 0 <= row < frame.rows:
             counts[int(row), int(column)] += 1

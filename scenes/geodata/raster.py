@@ -15,16 +15,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.errors import InputError
 
-__all__ = ["Elevation", "Grid", "Image"]
+__all__ = ["Elevation", "Frame", "Grid", "Image"]
 
 #: Rows of points put on a grid at a time.
 _CHUNK = 1_000_000
+
+
+class Frame(NamedTuple):
+    """A grid as kernels take it: upper left corner and cell size in metres, rows and columns."""
+
+    west: float
+    north: float
+    gsd: float
+    rows: int
+    columns: int
 
 
 @dataclass(frozen=True)
@@ -45,6 +56,11 @@ class Grid:
         columns = max(1, math.ceil((xmax - west) / gsd - 1e-9))
         rows = max(1, math.ceil((north - ymin) / gsd - 1e-9))
         return cls(west, north, gsd, rows, columns)
+
+    @property
+    def frame(self) -> Frame:
+        """The grid for kernels."""
+        return Frame(self.west, self.north, self.gsd, self.rows, self.columns)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -173,7 +173,7 @@ def _blocks(values: _Floats) -> _Floats:
 
 
 @kernel
-def _relax(values, known, rounds):  # type: ignore[no-untyped-def]
+def _relax(values: _Floats, known: _Mask, rounds: int) -> None:
     """Move unknown cells to the mean of their neighbours, in place, `rounds` sweeps in alternating order."""
     rows, columns = values.shape
     for sweep in range(rounds):

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from ..geodata.density import point_spacing
-from ..geodata.raster import Elevation, Grid
+from ..geodata.raster import Elevation, Frame, Grid
 
 __all__ = ["default_cell", "lowest_surface", "mean_above"]
 
@@ -50,45 +50,54 @@ def lowest_surface(x: _Coordinates, y: _Coordinates, z: _Coordinates, grid: Grid
     of its height: a reflection from below the ground or a no-data height. It is passed over for the next lowest.
     """
     start = np.zeros(grid.rows * grid.columns + 1, dtype=np.int64)
-    frame = (grid.west, grid.north, grid.gsd, grid.rows, grid.columns)
-    _count(x, y, *frame, start)
+    _count(x, y, grid.frame, start)
     np.cumsum(start, out=start)
     heights = np.empty(start[-1], dtype=np.float32)
-    _group(x, y, z, *frame, start, heights)
-    return _lowest_supported(heights, start, grid.rows, grid.columns)  # type: ignore[no-any-return]
+    _group(x, y, z, grid.frame, start, heights)
+    lowest: NDArray[np.float32] = _lowest_supported(heights, start, grid.rows, grid.columns)
+    return lowest
 
 
 @kernel(inline="always")
-def _cell_of(x, y, west, north, side, rows, columns):  # type: ignore[no-untyped-def]
+def _cell_of(x: float, y: float, frame: Frame) -> int:
     """Return the flat cell of a place, -1 outside."""
-    row, column = (north - y) / side, (x - west) / side
-    return int(row) * columns + int(column) if 0 <= row < rows and 0 <= column < columns else -1
+    row, column = (frame.north - y) / frame.gsd, (x - frame.west) / frame.gsd
+    return int(row) * frame.columns + int(column) if 0 <= row < frame.rows and 0 <= column < frame.columns else -1
 
 
 @kernel
-def _count(x, y, west, north, side, rows, columns, counts):  # type: ignore[no-untyped-def]
+def _count(x: _Coordinates, y: _Coordinates, frame: Frame, counts: NDArray[np.int64]) -> None:
     """Count the points of each cell, in the place after its own."""
     for i in range(len(x)):
-        k = _cell_of(x[i], y[i], west, north, side, rows, columns)
+        k = _cell_of(x[i], y[i], frame)
         if k >= 0:
             counts[k + 1] += 1
 
 
 @kernel
-def _group(x, y, z, west, north, side, rows, columns, start, heights):  # type: ignore[no-untyped-def]
+def _group(
+    x: _Coordinates,
+    y: _Coordinates,
+    z: _Coordinates,
+    frame: Frame,
+    start: NDArray[np.int64],
+    heights: NDArray[np.float32],
+) -> None:
     """Write the heights cell by cell; afterwards as before, cell c begins at ``start[c]``."""
     for i in range(len(x)):
-        k = _cell_of(x[i], y[i], west, north, side, rows, columns)
+        k = _cell_of(x[i], y[i], frame)
         if k >= 0:
             heights[start[k]] = z[i]
             start[k] += 1
-    for k in range(rows * columns, 0, -1):
+    for k in range(frame.rows * frame.columns, 0, -1):
         start[k] = start[k - 1]
     start[0] = 0
 
 
 @kernel
-def _lowest_supported(heights, start, rows, columns):  # type: ignore[no-untyped-def]
+def _lowest_supported(
+    heights: NDArray[np.float32], start: NDArray[np.int64], rows: int, columns: int
+) -> NDArray[np.float32]:
     """Lowest supported height per cell; `heights` is grouped by cell, cell c holds ``start[c]:start[c + 1]``."""
     lowest = np.full((rows, columns), np.nan, dtype=np.float32)
     for row in range(rows):
@@ -109,7 +118,16 @@ def _lowest_supported(heights, start, rows, columns):  # type: ignore[no-untyped
 
 
 @kernel
-def _supported(heights, start, rows, columns, row, column, height):  # type: ignore[no-untyped-def]
+def _supported(
+    heights: NDArray[np.float32],
+    start: NDArray[np.int64],
+    rows: int,
+    columns: int,
+    row: int,
+    column: int,
+    height: float,
+) -> bool:
+    """Return whether enough points around lie near a height."""
     support, around = 0, 0
     for r in range(max(row - 2, 0), min(row + 3, rows)):
         first = start[r * columns + max(column - 2, 0)]
@@ -118,7 +136,7 @@ def _supported(heights, start, rows, columns, row, column, height):  # type: ign
         for i in range(first, last):
             if abs(heights[i] - height) < _SUPPORT_HEIGHT:
                 support += 1
-    return support >= max(_SUPPORT, _SUPPORT_SHARE * around)
+    return bool(support >= max(_SUPPORT, _SUPPORT_SHARE * around))
 
 
 def mean_above(
@@ -137,19 +155,27 @@ def mean_above(
     """
     grid = surface.grid
     count, total = np.zeros(grid.rows * grid.columns, dtype=np.int32), np.zeros(grid.rows * grid.columns)
-    frame = (grid.west, grid.north, grid.gsd, grid.rows, grid.columns)
     for first in range(0, len(x), _CHUNK):
         part = slice(first, first + _CHUNK)
-        _add_near(x[part], y[part], z[part] - surface.sample(x[part], y[part]), tolerance, *frame, count, total)
+        _add_near(x[part], y[part], z[part] - surface.sample(x[part], y[part]), tolerance, grid.frame, count, total)
     mean = np.full(grid.shape, np.nan, dtype=np.float32)
     np.divide(total.reshape(grid.shape), count.reshape(grid.shape), out=mean, where=count.reshape(grid.shape) > 0)
     return mean
 
 
 @kernel
-def _add_near(x, y, above, tolerance, west, north, side, rows, columns, count, total):  # type: ignore[no-untyped-def]
+def _add_near(
+    x: _Coordinates,
+    y: _Coordinates,
+    above: NDArray[np.float64],
+    tolerance: float,
+    frame: Frame,
+    count: NDArray[np.int32],
+    total: NDArray[np.float64],
+) -> None:
+    """Add the points near a surface, `above` it in metres, to the number and the sum of their cells."""
     for i in range(len(x)):
-        k = _cell_of(x[i], y[i], west, north, side, rows, columns)
+        k = _cell_of(x[i], y[i], frame)
         if k >= 0 and abs(above[i]) < tolerance:
             count[k] += 1
             total[k] += above[i]

@@ -23,7 +23,7 @@ from .solids import Body, Roof, Solid, Texture
 from .streams import Draws, stream
 from .vegetation import nearest_rectangle, rectangle_table
 
-__all__ = ["Cover", "Patch", "scatter"]
+__all__ = ["Cover", "Patch", "patch_table", "scatter"]
 
 _HEDGE = PALETTES["leaves"]
 _TIMBER = (0.50, 0.44, 0.37, 0.48)

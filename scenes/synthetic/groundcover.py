@@ -7,17 +7,19 @@ tell how dry it is: every parcel has its own gardener.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from ..geodata.raster import Grid
+from ..geodata.raster import Frame, Grid
+from ..geodata.sampling import bilinear_at
 from .clutter import Cover
 from .layout import FIELDS, HALLS, PARK, TOWERS, zone_of
 from .parcels import HALL_WIDTH
 from .streams import uniform
-from .world import World, ground_at
+from .world import World
 
 __all__ = ["GRASS", "cover_codes"]
 
@@ -29,38 +31,42 @@ _GRAVEL, _STUBBLE, _MAIZE, _VINES = map(int, (Cover.GRAVEL, Cover.STUBBLE, Cover
 def cover_codes(world: World, grid: Grid) -> NDArray[np.uint8]:
     """Return the ground cover on a grid in local coordinates, shape (rows, columns)."""
     layout = world.layout
-    raster = layout.u.grid
     codes = np.empty(grid.shape, dtype=np.uint8)
     _streets(
         codes,
-        (grid.west, grid.north, grid.gsd),
-        layout.u.values,
-        layout.v.values,
-        (raster.west, raster.north, raster.gsd),
-        layout.pattern,
-        layout.key,
-        layout.zones,
-        np.array(layout.first),
+        grid.frame,
+        _Streets(
+            layout.u.values,
+            layout.v.values,
+            layout.u.grid.frame,
+            layout.pattern,
+            layout.key,
+            layout.zones,
+            np.array(layout.first),
+        ),
         world.recipe.dryness,
     )
-    _patches(codes, (grid.west, grid.north, grid.gsd), world.patches)
+    _patches(codes, grid.frame, world.patches)
     return codes
 
 
+class _Streets(NamedTuple):
+    """A `Layout` as kernels take it: `u` and `v` on the raster `frame`."""
+
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+    frame: Frame
+    pattern: NDArray[np.float64]
+    key: np.uint64
+    zones: NDArray[np.uint8]
+    first: NDArray[np.int64]
+
+
 @kernel
-def _streets(
-    codes: NDArray[np.uint8],
-    frame: tuple[float, float, float],
-    u: NDArray[np.float64],
-    v: NDArray[np.float64],
-    raster: tuple[float, float, float],
-    pattern: NDArray[np.float64],
-    key: int,
-    zones: NDArray[np.uint8],
-    first: NDArray[np.int64],
-    dryness: float,
-) -> None:
-    west, north, gsd = frame
+def _streets(codes: NDArray[np.uint8], frame: Frame, streets: _Streets, dryness: float) -> None:
+    """Fill the codes of streets, parcels and fields."""
+    west, north, gsd, _, _ = frame
+    u, v, raster, pattern, key, zones, first = streets
     period, length, street, cross = pattern[0], pattern[1], pattern[2], pattern[3]
     line = np.empty((2, u.shape[1]))
     known, offset = 1 << 30, 0.0
@@ -69,11 +75,11 @@ def _streets(
         # Interpolated down once a row, then across for every cell.
         y = north - (r + 0.5) * gsd
         for k in range(u.shape[1]):
-            x = raster[0] + (k + 0.5) * raster[2]
-            line[0, k] = ground_at(u, raster[0], raster[1], raster[2], x, y)
-            line[1, k] = ground_at(v, raster[0], raster[1], raster[2], x, y)
+            x = raster.west + (k + 0.5) * raster.gsd
+            line[0, k] = bilinear_at(u, raster.west, raster.north, raster.gsd, x, y)
+            line[1, k] = bilinear_at(v, raster.west, raster.north, raster.gsd, x, y)
         for c in range(codes.shape[1]):
-            position = (west + (c + 0.5) * gsd - raster[0]) / raster[2] - 0.5
+            position = (west + (c + 0.5) * gsd - raster.west) / raster.gsd - 0.5
             k = int(position)
             right = position - k
             pu = line[0, k] + (line[0, k + 1] - line[0, k]) * right
@@ -156,8 +162,9 @@ def _field_code(block: int, row: int, along: float, across: float, pattern: NDAr
 
 
 @kernel
-def _patches(codes: NDArray[np.uint8], frame: tuple[float, float, float], patches: NDArray[np.float64]) -> None:
-    west, north, gsd = frame
+def _patches(codes: NDArray[np.uint8], frame: Frame, patches: NDArray[np.float64]) -> None:
+    """Overwrite the codes inside the rectangles of the patches."""
+    west, north, gsd, _, _ = frame
     for k in range(len(patches)):
         x0, y0, angle, length, width, code = patches[k]
         cosine, sine = math.cos(angle), math.sin(angle)

@@ -17,20 +17,21 @@ next return is exponentially distributed. Returns closer than the receiver's dea
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from ..geodata.points import PointCloud
-from ..geodata.raster import Grid
+from ..geodata.raster import Frame, Grid
 from .clutter import Cover
 from .groundcover import cover_codes
 from .palettes import GROUND, LAWNS
 from .recipe import SceneParameters
 from .solids import Body
 from .streams import counter_key, gauss, stream, uniform
-from .world import CellIndex, World, ground_at
+from .world import CellIndex, CellLists, Relief, World, ground_at
 
 __all__ = ["scan"]
 
@@ -56,38 +57,30 @@ def scan(world: World, origin: tuple[float, float]) -> PointCloud:
     solids, trees = world.solids, world.trees
     solid_index, blob_index = CellIndex.of_solids(world), CellIndex.of_blobs(world)
     cover_grid = Grid.covering((0, 0, recipe.width, recipe.height), 0.5)
-    codes = cover_codes(world, cover_grid)
-    terrain = world.terrain
     ground_nir = np.zeros(256)
     ground_nir[: len(GROUND)] = GROUND[:, 3]
     ground_nir[64:128] = LAWNS[0, 3] + (LAWNS[1, 3] - LAWNS[0, 3]) * np.arange(64) / 63
+    ground = _Ground(Relief.of(world.terrain), cover_codes(world, cover_grid), cover_grid.frame, ground_nir)
+    standing = _Standing(
+        solids.planes,
+        solids.body,
+        np.ascontiguousarray(solids.colour[:, 3]),
+        np.ascontiguousarray(solids.wall[:, 3]),
+        solid_index.lists,
+    )
+    leaves = _Leaves(trees.blobs, trees.tree, np.ascontiguousarray(trees.colour[:, 3]), blob_index.lists)
+    scanner = _Scanner(
+        recipe.width,
+        recipe.height,
+        recipe.vertical_noise,
+        recipe.horizontal_noise,
+        recipe.dropouts,
+        _MODES[recipe.pulse],
+        counter_key(world.seed, "lidar"),
+    )
     pieces = []
     for start in range(0, len(places), _CHUNK):
-        pieces.append(
-            _scan_chunk(
-                places[start : start + _CHUNK],
-                start,
-                terrain.values,
-                (terrain.grid.west, terrain.grid.north, terrain.grid.gsd),
-                codes,
-                (cover_grid.west, cover_grid.north, cover_grid.gsd),
-                ground_nir,
-                (solid_index.columns, solid_index.rows),
-                solid_index.arrays,
-                blob_index.arrays,
-                solids.planes,
-                solids.body,
-                np.ascontiguousarray(solids.colour[:, 3]),
-                np.ascontiguousarray(solids.wall[:, 3]),
-                trees.blobs,
-                trees.tree,
-                np.ascontiguousarray(trees.colour[:, 3]),
-                (recipe.width, recipe.height),
-                (recipe.vertical_noise, recipe.horizontal_noise, recipe.dropouts),
-                _MODES[recipe.pulse],
-                counter_key(world.seed, "lidar"),
-            )
-        )
+        pieces.append(_scan_chunk(places[start : start + _CHUNK], start, ground, standing, leaves, scanner))
     xyz, returns, intensity, classes = (np.concatenate(column) for column in zip(*pieces, strict=True))
     known = recipe.pulse == "all"
     return PointCloud(
@@ -179,27 +172,69 @@ def _strip(
     return out[:count].copy()
 
 
+class _Ray(NamedTuple):
+    """A pulse: its place on the bare earth, the elevation there, and its tilt in metres per metre of height."""
+
+    x: float
+    y: float
+    ground: float
+    tx: float
+    ty: float
+
+
+class _Ground(NamedTuple):
+    """Bare earth and ground cover; `nir` is the reflectance of each cover code."""
+
+    relief: Relief
+    codes: NDArray[np.uint8]
+    frame: Frame
+    nir: NDArray[np.float64]
+
+
+class _Standing(NamedTuple):
+    """Solids: planes of their faces, kind, and reflectance of roofs and walls."""
+
+    planes: NDArray[np.float64]
+    body: NDArray[np.uint8]
+    roof_nir: NDArray[np.float32]
+    wall_nir: NDArray[np.float32]
+    cells: CellLists
+
+
+class _Leaves(NamedTuple):
+    """Crowns: blobs, the tree of each, and the reflectance of each tree."""
+
+    blobs: NDArray[np.float64]
+    tree: NDArray[np.int32]
+    nir: NDArray[np.float32]
+    cells: CellLists
+
+
+class _Scanner(NamedTuple):
+    """The extent that is kept, noise in metres, share of dropouts, mode, and key of the random numbers."""
+
+    width: float
+    height: float
+    vertical_noise: float
+    horizontal_noise: float
+    dropouts: float
+    mode: int
+    key: np.uint64
+
+
 @kernel
-def _solid_top(
-    x: float,
-    y: float,
-    ground: float,
-    tx: float,
-    ty: float,
-    size: tuple[int, int],
-    cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
-    planes: NDArray[np.float64],
-) -> tuple[float, int, int]:
+def _solid_top(ray: _Ray, cells: CellLists, planes: NDArray[np.float64]) -> tuple[float, int, int]:
     """Return the height above ground at which a pulse meets the first solid, the solid (-1: none), and its face."""
-    start, items, top, highest = cells
+    x, y, ground, tx, ty = ray
+    start, items, top, highest, size_x, size_y = cells
     best, hit, where = 0.0, -1, 0
     lean = max(abs(tx), abs(ty))
     height, previous = 0.0, -1
     while True:
         i, j = int((x + tx * height) // 4.0), int((y + ty * height) // 4.0)
-        if i < 0 or j < 0 or i >= size[0] or j >= size[1]:
+        if i < 0 or j < 0 or i >= size_x or j >= size_y:
             break
-        cell = j * size[0] + i
+        cell = j * size_x + i
         if cell != previous and top[cell] > ground + best:
             for n in range(start[cell], start[cell + 1]):
                 k = items[n]
@@ -229,26 +264,18 @@ def _solid_top(
 
 @kernel
 def _leaf_hits(
-    x: float,
-    y: float,
-    ground: float,
-    tx: float,
-    ty: float,
-    floor: float,
-    size: tuple[int, int],
-    cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
-    blobs: NDArray[np.float64],
-    found: NDArray[np.float64],
+    ray: _Ray, floor: float, cells: CellLists, blobs: NDArray[np.float64], found: NDArray[np.float64]
 ) -> int:
     """Collect the ways through blobs above `floor` (heights above ground: entry, exit, blob); return how many."""
-    start, items, top, highest = cells
+    x, y, ground, tx, ty = ray
+    start, items, top, highest, size_x, size_y = cells
     count, height, previous = 0, 0.0, -1
     lean = max(abs(tx), abs(ty), 1e-6)
     while ground + height <= highest:
         i, j = int((x + tx * height) // 4.0), int((y + ty * height) // 4.0)
-        if i < 0 or j < 0 or i >= size[0] or j >= size[1]:
+        if i < 0 or j < 0 or i >= size_x or j >= size_y:
             break
-        cell = j * size[0] + i
+        cell = j * size_x + i
         if cell != previous and top[cell] > ground + floor:
             for n in range(start[cell], start[cell + 1]):
                 k = items[n]
@@ -284,27 +311,14 @@ def _leaf_hits(
 def _scan_chunk(
     places: NDArray[np.float64],
     number: int,
-    terrain: NDArray[np.float32],
-    raster: tuple[float, float, float],
-    codes: NDArray[np.uint8],
-    cover: tuple[float, float, float],
-    ground_nir: NDArray[np.float64],
-    size: tuple[int, int],
-    solid_cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
-    blob_cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
-    planes: NDArray[np.float64],
-    body: NDArray[np.uint8],
-    roof_nir: NDArray[np.float32],
-    wall_nir: NDArray[np.float32],
-    blobs: NDArray[np.float64],
-    tree: NDArray[np.int32],
-    leaf_nir: NDArray[np.float32],
-    extent: tuple[float, float],
-    noise: tuple[float, float, float],
-    mode: int,
-    key: int,
+    ground: _Ground,
+    standing: _Standing,
+    leaves: _Leaves,
+    scanner: _Scanner,
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint8]]:
-    """Send pulses; returns coordinates, (return number, number of returns), intensities, ASPRS classes."""
+    """Send pulses; return coordinates, (return number, number of returns), intensities, ASPRS classes."""
+    mode, key = scanner.mode, scanner.key
+    codes, cover = ground.codes, ground.frame
     room = len(places) * (_MOST if mode == 2 else 1)
     xyz, returns = np.empty((room, 3)), np.empty((room, 2), dtype=np.uint8)
     intensity, classes = np.empty(room, dtype=np.uint16), np.empty(room, dtype=np.uint8)
@@ -314,47 +328,48 @@ def _scan_chunk(
     for p in range(len(places)):
         x, y, tx, ty = places[p]
         counter = (number + p) * 32
-        ground = ground_at(terrain, raster[0], raster[1], raster[2], x, y)
-        height, hit, face = _solid_top(x, y, ground, tx, ty, size, solid_cells, planes)
-        echoes, leaves = _crown_echoes(
-            x, y, ground, tx, ty, height, size, blob_cells, blobs, tree, leaf_nir, found, echo, key, counter
-        )
+        level = ground_at(ground.relief, x, y)
+        ray = _Ray(x, y, level, tx, ty)
+        height, hit, face = _solid_top(ray, standing.cells, standing.planes)
+        echoes, length = _crown_echoes(ray, height, leaves, found, echo, key, counter)
         # What a crown has not taken reaches the roof or the ground below it.
-        if echoes == 0 or uniform(key, counter + 7) < math.exp(-_OPAQUE * leaves):
-            row = min(int((cover[1] - y) / cover[2]), codes.shape[0] - 1)
-            column = min(int((x - cover[0]) / cover[2]), codes.shape[1] - 1)
+        if echoes == 0 or uniform(key, counter + 7) < math.exp(-_OPAQUE * length):
+            row = min(int((cover.north - y) / cover.gsd), codes.shape[0] - 1)
+            column = min(int((x - cover.west) / cover.gsd), codes.shape[1] - 1)
             code = codes[row, column]
             if hit >= 0:
-                kind = body[hit]
+                kind = standing.body[hit]
                 rough = 0.10 * gauss(key, counter + 1) if kind == _HEDGE else 0.0
                 cls = 6.0 if kind in (_BUILDING, _FURNITURE) else 3.0 if kind == _HEDGE else 1.0
-                _put(echo, echoes, max(height + rough, 0.0), roof_nir[hit] if face >= 4 else wall_nir[hit], cls)
+                nir = standing.roof_nir[hit] if face >= 4 else standing.wall_nir[hit]
+                _put(echo, echoes, max(height + rough, 0.0), nir, cls)
                 echoes += 1
             elif not (code == _POOL and uniform(key, counter + 2) < 0.93):
                 # Grass stands a few centimetres high, unevenly.
                 tuft = 0.03 * abs(gauss(key, counter + 3)) if code >= 64 else 0.0
-                _put(echo, echoes, tuft, ground_nir[code], 2.0 if code != _POOL else 9.0)
+                _put(echo, echoes, tuft, ground.nir[code], 2.0 if code != _POOL else 9.0)
                 echoes += 1
-        if hit >= 0 or top_near(x, y, size, solid_cells[2]) > ground:
-            echoes = _edge_echo(
-                x, y, ground, tx, ty, height, size, solid_cells, planes, body, roof_nir, echo, echoes, key, counter
-            )
+        if hit >= 0 or top_near(x, y, standing.cells) > level:
+            echoes = _edge_echo(ray, height, standing, echo, echoes, key, counter)
         if echoes == 0:
             continue
         brightness = echo[0, 1]
-        if uniform(key, counter + 4) < noise[2] * (2.5 if brightness < 0.3 else 1.0):
+        if uniform(key, counter + 4) < scanner.dropouts * (2.5 if brightness < 0.3 else 1.0):
             continue
         first = echoes - 1 if mode == 1 else 0
         last = 1 if mode == 0 else echoes
-        off_x, off_y = noise[1] * gauss(key, counter + 5), noise[1] * gauss(key, counter + 6)
+        off_x, off_y = (
+            scanner.horizontal_noise * gauss(key, counter + 5),
+            scanner.horizontal_noise * gauss(key, counter + 6),
+        )
         share = 1.0 / echoes
         for e in range(first, last):
-            level = echo[e, 0]
-            px, py = x + tx * level + off_x, y + ty * level + off_y
-            if px < 0 or py < 0 or px >= extent[0] or py >= extent[1]:
+            above = echo[e, 0]
+            px, py = x + tx * above + off_x, y + ty * above + off_y
+            if px < 0 or py < 0 or px >= scanner.width or py >= scanner.height:
                 continue
             xyz[count, 0], xyz[count, 1] = px, py
-            xyz[count, 2] = ground + level + noise[0] * gauss(key, counter + 8 + e)
+            xyz[count, 2] = level + above + scanner.vertical_noise * gauss(key, counter + 8 + e)
             returns[count, 0], returns[count, 1] = e + 1, echoes
             strength = echo[e, 1] * (0.35 + 0.65 * share) * (1.0 + 0.12 * gauss(key, counter + 16 + e))
             intensity[count] = int(min(max(strength, 0.004), 1.0) * 40000.0)
@@ -365,35 +380,28 @@ def _scan_chunk(
 
 @kernel
 def _put(echo: NDArray[np.float64], e: int, level: float, reflectance: float, asprs: float) -> None:
+    """Set one echo: height above ground, reflectance, ASPRS class."""
     echo[e, 0], echo[e, 1], echo[e, 2] = level, reflectance, asprs
 
 
 @kernel
-def top_near(x: float, y: float, size: tuple[int, int], top: NDArray[np.float64]) -> float:
+def top_near(x: float, y: float, cells: CellLists) -> float:
     """Return the highest elevation of anything in the cell of a place."""
-    return top[int(y // 4.0) * size[0] + int(x // 4.0)]  # type: ignore[no-any-return]
+    return float(cells.top[int(y // 4.0) * cells.columns + int(x // 4.0)])
 
 
 @kernel
 def _crown_echoes(
-    x: float,
-    y: float,
-    ground: float,
-    tx: float,
-    ty: float,
+    ray: _Ray,
     floor: float,
-    size: tuple[int, int],
-    cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
-    blobs: NDArray[np.float64],
-    tree: NDArray[np.int32],
-    leaf_nir: NDArray[np.float32],
+    leaves: _Leaves,
     found: NDArray[np.float64],
     echo: NDArray[np.float64],
-    key: int,
+    key: np.uint64,
     counter: int,
 ) -> tuple[int, float]:
     """Fill `echo` with the returns of leaves, the highest first; return how many, and the length of way in leaves."""
-    ways = _leaf_hits(x, y, ground, tx, ty, floor, size, cells, blobs, found)
+    ways = _leaf_hits(ray, floor, leaves.cells, leaves.blobs, found)
     echoes, length = 0, 0.0
     reached = 1e9
     left = -math.log(1.0 - uniform(key, counter + 24)) / _DENSE
@@ -405,7 +413,7 @@ def _crown_echoes(
             k = int(found[m, 2])
             apart = echoes == 0 or echo[echoes - 1, 0] - upper >= _DEAD_ZONE
             if apart and upper > floor + _DEAD_ZONE * 0.5:
-                _put(echo, echoes, upper, leaf_nir[tree[k]], 5.0)
+                _put(echo, echoes, upper, leaves.nir[leaves.tree[k]], 5.0)
                 echoes += 1
             left = -math.log(1.0 - uniform(key, counter + 25 + echoes)) / _LOOSE
         if upper > lower:
@@ -416,32 +424,25 @@ def _crown_echoes(
 
 @kernel
 def _edge_echo(
-    x: float,
-    y: float,
-    ground: float,
-    tx: float,
-    ty: float,
+    ray: _Ray,
     height: float,
-    size: tuple[int, int],
-    cells: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float],
-    planes: NDArray[np.float64],
-    body: NDArray[np.uint8],
-    roof_nir: NDArray[np.float32],
+    standing: _Standing,
     echo: NDArray[np.float64],
     echoes: int,
-    key: int,
+    key: np.uint64,
     counter: int,
 ) -> int:
     """Add the return of the other part of the footprint where an edge runs through it."""
     if echoes != 1:
         return echoes
     aside_x, aside_y = _FOOTPRINT * gauss(key, counter + 20), _FOOTPRINT * gauss(key, counter + 21)
-    other, hit, _ = _solid_top(x + aside_x, y + aside_y, ground, tx, ty, size, cells, planes)
+    aside = _Ray(ray.x + aside_x, ray.y + aside_y, ray.ground, ray.tx, ray.ty)
+    other, hit, _ = _solid_top(aside, standing.cells, standing.planes)
     if abs(other - height) < 1.5:
         return echoes
     if other > height:
         echo[1] = echo[0]
-        _put(echo, 0, other, roof_nir[hit], 6.0 if body[hit] <= 1 else 1.0)
+        _put(echo, 0, other, standing.roof_nir[hit], 6.0 if standing.body[hit] <= 1 else 1.0)
     else:
         _put(echo, 1, other, echo[0, 1] * 0.8, 2.0 if hit < 0 else 6.0)
     return 2

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from ..geodata.raster import Frame
 from .clutter import Cover
 from .palettes import GROUND, LAWNS
 from .recipe import SceneParameters
@@ -90,61 +92,87 @@ def colour_surface(
     colours = np.empty((bands, *surface.z.shape), dtype=np.uint8)
     _paint(
         colours,
-        surface.z,
-        surface.label,
-        codes,
-        sunlit(surface, world.recipe),
-        (surface.grid.west, surface.grid.north, surface.grid.gsd),
-        sun,
-        face_light,
-        solids.rectangle,
-        solids.texture,
-        solids.body,
-        solids.colour,
-        trees.blobs,
-        trees.tree,
-        trees.colour,
-        np.stack([trees.ground, trees.height], axis=-1),
-        tiles[0],
-        tiles[1],
-        GROUND,
-        LAWNS,
-        AMBIENT,
-        HAZE,
-        world.recipe.exposure,
-        (float(world.layout.pattern[8]), float(world.layout.pattern[9])),
+        _View(surface.z, surface.label, codes, sunlit(surface, world.recipe), surface.grid.frame),
+        _Roofs(face_light, solids.rectangle, solids.texture, solids.body, solids.colour),
+        _Crowns(trees.blobs, trees.tree, trees.colour, np.stack([trees.ground, trees.height], axis=-1)),
+        _Cover(GROUND, LAWNS, float(world.layout.pattern[8]), float(world.layout.pattern[9])),
+        _Light(sun, AMBIENT, HAZE, world.recipe.exposure),
+        tiles,
     )
     return colours
+
+
+class _View(NamedTuple):
+    """The surface seen from above, ground cover, and where the sun reaches; all on the grid of `frame`."""
+
+    z: NDArray[np.float32]
+    label: NDArray[np.int32]
+    codes: NDArray[np.uint8]
+    lit: NDArray[np.bool_]
+    frame: Frame
+
+
+class _Roofs(NamedTuple):
+    """Solids as the sun sees them; `face_light` is the share of direct light on each face."""
+
+    face_light: NDArray[np.float64]
+    rectangle: NDArray[np.float64]
+    texture: NDArray[np.uint8]
+    body: NDArray[np.uint8]
+    colour: NDArray[np.float32]
+
+
+class _Crowns(NamedTuple):
+    """Blobs of leaves, the tree of each, and colour and size (ground, height) of each tree."""
+
+    blobs: NDArray[np.float64]
+    tree: NDArray[np.int32]
+    colour: NDArray[np.float32]
+    size: NDArray[np.float64]
+
+
+class _Cover(NamedTuple):
+    """Colours of ground covers and lawns, and the direction of the drills of fields (cosine, sine)."""
+
+    ground: NDArray[np.float32]
+    lawns: NDArray[np.float32]
+    cosine: float
+    sine: float
+
+
+class _Light(NamedTuple):
+    """Vector towards the sun, light of the sky and of the air per band, and exposure."""
+
+    sun: NDArray[np.float64]
+    ambient: NDArray[np.float32]
+    haze: NDArray[np.float32]
+    exposure: float
+
+
+class _Spot(NamedTuple):
+    """A cell: its place, and fine and coarse noise there."""
+
+    x: float
+    y: float
+    grain: float
+    patchy: float
 
 
 @kernel
 def _paint(
     colours: NDArray[np.uint8],
-    z: NDArray[np.float32],
-    label: NDArray[np.int32],
-    codes: NDArray[np.uint8],
-    lit: NDArray[np.bool_],
-    frame: tuple[float, float, float],
-    sun: NDArray[np.float64],
-    face_light: NDArray[np.float64],
-    rectangle: NDArray[np.float64],
-    texture: NDArray[np.uint8],
-    body: NDArray[np.uint8],
-    solid_colour: NDArray[np.float32],
-    blobs: NDArray[np.float64],
-    tree: NDArray[np.int32],
-    tree_colour: NDArray[np.float32],
-    tree_size: NDArray[np.float64],
-    fine: NDArray[np.float32],
-    coarse: NDArray[np.float32],
-    ground: NDArray[np.float32],
-    lawns: NDArray[np.float32],
-    ambient: NDArray[np.float32],
-    haze: NDArray[np.float32],
-    exposure: float,
-    turn: tuple[float, float],
+    view: _View,
+    roofs: _Roofs,
+    crowns: _Crowns,
+    cover: _Cover,
+    light: _Light,
+    tiles: tuple[NDArray[np.float32], NDArray[np.float32]],
 ) -> None:
-    west, north, gsd = frame
+    """Fill the colours of every cell: those of what lies there, by the light that reaches it."""
+    z, label, codes, lit, frame = view
+    west, north, gsd, _, _ = frame
+    sun, ambient, haze, exposure = light
+    fine, coarse = tiles
     bands, rows, columns = colours.shape
     mask = fine.shape[0] - 1
     wide = coarse.shape[0] - 1
@@ -158,8 +186,8 @@ def _paint(
             # Coarse noise is tied to metres: one cell of the tile is 0.5 m.
             patchy = coarse[int(y * 2.0) & wide, int(x * 2.0) & wide]
             if mark == 0:
-                drill = turn[0] * y - turn[1] * x  # across the drills of a field
-                direct = _ground_albedo(albedo, codes[r, c], drill, grain, patchy, ground, lawns)
+                drill = cover.cosine * y - cover.sine * x  # across the drills of a field
+                direct = _ground_albedo(albedo, codes[r, c], drill, grain, patchy, cover)
                 r1, c1 = max(r - 1, 0), max(c - 1, 0)
                 if label[r1, c] == 0 and label[r, c1] == 0:
                     dzdx = (z[r, c] - z[r, c1]) / gsd
@@ -167,17 +195,13 @@ def _paint(
                     direct *= max((sun[2] - sun[0] * dzdx - sun[1] * dzdy), 0.0) / sun[2]
             elif mark > 0:
                 k, face = (mark - 1) >> 3, (mark - 1) & 7
-                direct = _solid_albedo(
-                    albedo, k, x, y, grain, patchy, rectangle, texture[k], body[k], solid_colour, face
-                )
-                direct *= face_light[k, face]
+                direct = _solid_albedo(albedo, k, face, _Spot(x, y, grain, patchy), roofs)
+                direct *= roofs.face_light[k, face]
             else:
-                direct = _leaf_albedo(
-                    albedo, -1 - mark, x, y, z[r, c], grain, patchy, sun, blobs, tree, tree_colour, tree_size
-                )
+                direct = _leaf_albedo(albedo, -1 - mark, z[r, c], _Spot(x, y, grain, patchy), sun, crowns)
             for b in range(bands):
-                light = ambient[b] + ((1.0 - ambient[b]) * direct if lit[r, c] else 0.0)
-                colours[b, r, c] = int(min(max(albedo[b] * light * 255.0 * exposure + haze[b], 2.0), 253.0))
+                bright = ambient[b] + ((1.0 - ambient[b]) * direct if lit[r, c] else 0.0)
+                colours[b, r, c] = int(min(max(albedo[b] * bright * 255.0 * exposure + haze[b], 2.0), 253.0))
 
 
 @kernel
@@ -187,15 +211,14 @@ def _ground_albedo(
     drill: float,
     grain: float,
     patchy: float,
-    ground: NDArray[np.float32],
-    lawns: NDArray[np.float32],
+    cover: _Cover,
 ) -> float:
     """Set the colour of the ground; return its share of direct light."""
     if code >= 64:
         dry = min(max((code - 64) / 63.0 + 0.22 * patchy, 0.0), 1.0)
         factor = 1.0 + 0.07 * grain + 0.05 * patchy
         for b in range(4):
-            albedo[b] = (lawns[0, b] * (1 - dry) + lawns[1, b] * dry) * factor
+            albedo[b] = (cover.lawns[0, b] * (1 - dry) + cover.lawns[1, b] * dry) * factor
     else:
         rough = 0.03 if code < 3 else 0.06
         factor = 1.0 + rough * grain + 0.05 * patchy
@@ -204,25 +227,16 @@ def _ground_albedo(
         elif code > _PLAZA:
             factor *= 1.0 + 0.10 * (((drill * 0.33) % 1.0) - 0.5)
         for b in range(4):
-            albedo[b] = ground[code, b] * factor
+            albedo[b] = cover.ground[code, b] * factor
     return 1.0
 
 
 @kernel
-def _solid_albedo(
-    albedo: NDArray[np.float64],
-    k: int,
-    x: float,
-    y: float,
-    grain: float,
-    patchy: float,
-    rectangle: NDArray[np.float64],
-    look: int,
-    body: int,
-    colour: NDArray[np.float32],
-    face: int,
-) -> float:
+def _solid_albedo(albedo: NDArray[np.float64], k: int, face: int, spot: _Spot, roofs: _Roofs) -> float:
     """Set the colour of a solid's top by its texture; return its share of direct light."""
+    x, y, grain, patchy = spot
+    _, rectangle, texture, body, colour = roofs
+    look = texture[k]
     cosine, sine = math.cos(rectangle[k, 2]), math.sin(rectangle[k, 2])
     dx, dy = x - rectangle[k, 0], y - rectangle[k, 1]
     along, across = cosine * dx + sine * dy, cosine * dy - sine * dx
@@ -242,7 +256,7 @@ def _solid_albedo(
         factor += 0.10 * grain + 0.10 * patchy
         bed = (along * 0.17) % 1.0 < 0.04 or (across * 0.17) % 1.0 < 0.04
         factor *= 0.92 if bed else 1.0
-    if body == _HEDGE:
+    if body[k] == _HEDGE:
         factor += 0.16 * grain
         direct = 0.85 + 0.2 * grain
     # Each face weathers in its own way.
@@ -254,20 +268,11 @@ def _solid_albedo(
 
 @kernel
 def _leaf_albedo(
-    albedo: NDArray[np.float64],
-    k: int,
-    x: float,
-    y: float,
-    z: float,
-    grain: float,
-    patchy: float,
-    sun: NDArray[np.float64],
-    blobs: NDArray[np.float64],
-    tree: NDArray[np.int32],
-    colour: NDArray[np.float32],
-    size: NDArray[np.float64],
+    albedo: NDArray[np.float64], k: int, z: float, spot: _Spot, sun: NDArray[np.float64], crowns: _Crowns
 ) -> float:
     """Set the colour of a crown; return its share of direct light, by the blob's normal and its leaves."""
+    x, y, grain, patchy = spot
+    blobs, tree, colour, size = crowns
     t = tree[k]
     nx = (x - blobs[k, 0]) / (blobs[k, 3] * blobs[k, 3])
     ny = (y - blobs[k, 1]) / (blobs[k, 3] * blobs[k, 3])

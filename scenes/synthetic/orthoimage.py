@@ -6,18 +6,19 @@ See `camera` for the geometry.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from ..geodata.raster import Grid, Image
+from ..geodata.raster import Frame, Grid, Image
 from .camera import camera_position, registration_offset
 from .groundcover import cover_codes
 from .lighting import AMBIENT, HAZE, colour_surface, sun_vector
 from .streams import counter_key, fractal_tile, gauss, stream, uniform
 from .surface import rasterise
-from .world import World, ground_at
+from .world import Relief, World, ground_at
 
 __all__ = ["photograph"]
 
@@ -38,30 +39,16 @@ def photograph(world: World, origin: tuple[float, float]) -> Image | None:
     surface = rasterise(world, grid, fine)
     colours = colour_surface(world, surface, cover_codes(world, grid), (fine, coarse), len(names))
     shift = registration_offset(recipe, world.seed)
-    terrain = world.terrain
     leaning = np.empty_like(colours)
-    _lean(
-        leaning,
-        colours,
-        surface.z,
-        surface.label,
-        (grid.west, grid.north, grid.gsd),
-        terrain.values,
-        (terrain.grid.west, terrain.grid.north, terrain.grid.gsd),
-        camera_position(recipe, world.seed),
-        shift,
-        world.solids.wall,
-        world.solids.base,
-        sun_vector(recipe),
-        AMBIENT,
-        HAZE,
-    )
-    values = _expose(leaning, _kernel(recipe.blur), recipe.image_noise, counter_key(world.seed, "image"))
+    walls = _Walls(world.solids.wall, world.solids.base, sun_vector(recipe), AMBIENT, HAZE)
+    view = _View(colours, surface.z, surface.label, grid.frame)
+    _lean(leaning, view, Relief.of(world.terrain), camera_position(recipe, world.seed), shift, walls)
+    values = _expose(leaning, _half_gaussian(recipe.blur), recipe.image_noise, counter_key(world.seed, "image"))
     moved = Grid(grid.west + origin[0], grid.north + origin[1], grid.gsd, grid.rows, grid.columns)
     return Image(values, names, moved)
 
 
-def _kernel(sigma: float) -> NDArray[np.float32]:
+def _half_gaussian(sigma: float) -> NDArray[np.float32]:
     """Return half of a normalised Gaussian, centre first."""
     if sigma < 0.05:
         return np.ones(1, dtype=np.float32)
@@ -83,11 +70,7 @@ def _block_tops(z: NDArray[np.float32], label: NDArray[np.int32]) -> NDArray[np.
 
 @kernel
 def _first_heights(
-    tops: NDArray[np.float64],
-    frame: tuple[float, float, float],
-    terrain: NDArray[np.float32],
-    raster: tuple[float, float, float],
-    camera: tuple[float, float, float],
+    tops: NDArray[np.float64], frame: Frame, relief: Relief, camera: tuple[float, float, float]
 ) -> NDArray[np.float64]:
     """Return, per block, a height above ground above which no ray of its cells can meet anything.
 
@@ -95,7 +78,7 @@ def _first_heights(
     of its cells differ a little.
     """
     rows, columns = tops.shape
-    size = _BLOCK * frame[2]
+    size = _BLOCK * frame.gsd
     wide = tops.copy()
     for i in range(rows):
         for j in range(columns):
@@ -105,20 +88,20 @@ def _first_heights(
     highest = tops.max()
     first = np.zeros((rows, columns))
     for i in range(rows):
-        y = frame[1] - (i + 0.5) * size
+        y = frame.north - (i + 0.5) * size
         for j in range(columns):
-            x = frame[0] + (j + 0.5) * size
-            ground = ground_at(terrain, raster[0], raster[1], raster[2], x, y)
+            x = frame.west + (j + 0.5) * size
+            ground = ground_at(relief, x, y)
             low = ground
             for dx in (-0.5 * size, 0.5 * size):
                 for dy in (-0.5 * size, 0.5 * size):
-                    low = min(low, ground_at(terrain, raster[0], raster[1], raster[2], x + dx, y + dy))
+                    low = min(low, ground_at(relief, x + dx, y + dy))
             tx, ty = (camera[0] - x) / (camera[2] - ground), (camera[1] - y) / (camera[2] - ground)
             rise = size / max(abs(tx), abs(ty), 1e-6)
             k = 0
             while (k - 1.5) * rise < highest - low:
                 height = k * rise
-                p, q = int((frame[1] - y - ty * height) / size), int((x + tx * height - frame[0]) / size)
+                p, q = int((frame.north - y - ty * height) / size), int((x + tx * height - frame.west) / size)
                 if p < 0 or q < 0 or p >= rows or q >= columns:
                     break
                 over = wide[p, q] - low
@@ -144,28 +127,49 @@ def _block_exit(i: int, j: int, k: int, step: float, columns: float, rows: float
     return k - max(int(fewest), 1)
 
 
+class _View(NamedTuple):
+    """Colours and surface as seen straight from above, on the grid of `frame`."""
+
+    colours: NDArray[np.uint8]
+    z: NDArray[np.float32]
+    label: NDArray[np.int32]
+    frame: Frame
+
+
+class _Walls(NamedTuple):
+    """Colour and foot of the walls of each solid, vector towards the sun, light of the sky and of the air."""
+
+    colour: NDArray[np.float32]
+    base: NDArray[np.float64]
+    sun: tuple[float, float, float]
+    ambient: NDArray[np.float32]
+    haze: NDArray[np.float32]
+
+
+class _Ray(NamedTuple):
+    """The ray from a place on the ground to the camera: x, y, and metres per metre of height."""
+
+    x: float
+    y: float
+    tx: float
+    ty: float
+
+
 @kernel
 def _lean(
     out: NDArray[np.uint8],
-    colours: NDArray[np.uint8],
-    z: NDArray[np.float32],
-    label: NDArray[np.int32],
-    frame: tuple[float, float, float],
-    terrain: NDArray[np.float32],
-    raster: tuple[float, float, float],
+    view: _View,
+    relief: Relief,
     camera: tuple[float, float, float],
     shift: tuple[float, float],
-    wall: NDArray[np.float32],
-    base: NDArray[np.float64],
-    sun: tuple[float, float, float],
-    ambient: NDArray[np.float32],
-    haze: NDArray[np.float32],
+    walls: _Walls,
 ) -> None:
     """Follow, for every image cell, the ray from its place on the bare earth to the camera: the last hit is seen."""
-    west, north, gsd = frame
+    colours, z, label, frame = view
+    west, north, gsd, _, _ = frame
     bands, rows, columns = out.shape
     tops = _block_tops(z, label)
-    first = _first_heights(tops, frame, terrain, raster, camera)
+    first = _first_heights(tops, frame, relief, camera)
     for r in range(rows):
         for c in range(columns):
             x = west + (c + 0.5) * gsd - shift[0]
@@ -177,7 +181,7 @@ def _lean(
                 for b in range(bands):
                     out[b, r, c] = colours[b, i0, j0]
                 continue
-            ground = ground_at(terrain, raster[0], raster[1], raster[2], x, y)
+            ground = ground_at(relief, x, y)
             tx, ty = (camera[0] - x) / (camera[2] - ground), (camera[1] - y) / (camera[2] - ground)
             lean = max(abs(tx), abs(ty), 1e-6)
             step = 0.8 * gsd / lean
@@ -212,43 +216,29 @@ def _lean(
                 for b in range(bands):
                     out[b, r, c] = int(colours[b, i, j] * 0.72)
             else:
-                _wall(out, r, c, (mark - 1) >> 3, x, y, side, tx, ty, lean, wall, base, sun, ambient, haze)
+                _wall(out[:, r, c], (mark - 1) >> 3, side, _Ray(x, y, tx, ty), walls)
 
 
 @kernel
-def _wall(
-    out: NDArray[np.uint8],
-    r: int,
-    c: int,
-    k: int,
-    x: float,
-    y: float,
-    level: float,
-    tx: float,
-    ty: float,
-    lean: float,
-    wall: NDArray[np.float32],
-    base: NDArray[np.float64],
-    sun: tuple[float, float, float],
-    ambient: NDArray[np.float32],
-    haze: NDArray[np.float32],
-) -> None:
+def _wall(out: NDArray[np.uint8], k: int, level: float, ray: _Ray, walls: _Walls) -> None:
     """Colour a cell that shows a wall: it looks towards the camera; floors are bands of windows."""
+    x, y, tx, ty = ray
+    wall, base, sun, ambient, haze = walls
     towards = (tx * sun[0] + ty * sun[1]) / math.sqrt(tx * tx + ty * ty)
     direct = max(towards, 0.0) / sun[2]
     storey = ((level - base[k]) / 3.2) % 1.0
     window = 0.62 if 0.35 < storey < 0.8 and ((x + y) * 0.31) % 1.0 < 0.7 else 1.0
     for b in range(out.shape[0]):
         light = ambient[b] * 1.1 + (1.0 - ambient[b]) * direct * 0.9
-        out[b, r, c] = int(min(wall[k, b] * window * light * 255.0 + haze[b], 250.0))
+        out[b] = int(min(wall[k, b] * window * light * 255.0 + haze[b], 250.0))
 
 
 @kernel
-def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float, key: int) -> NDArray[np.uint8]:
+def _expose(values: NDArray[np.uint8], spread: NDArray[np.float32], noise: float, key: np.uint64) -> NDArray[np.uint8]:
     """Blur by the point spread and add noise that is the same for no two cells nor bands."""
     bands, rows, columns = values.shape
     out = np.empty_like(values)
-    half = len(kernel) - 1
+    half = len(spread) - 1
     line = np.empty(columns, dtype=np.float32)
     # Each row of each band reads the same long strip of noise from a place of its own.
     grain = np.empty(_NOISE, dtype=np.float32)
@@ -262,16 +252,16 @@ def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float
             padded[:half], padded[half + columns :] = source[0], source[-1]
             for c in range(columns):
                 padded[half + c] = source[c]
-            _weighted(ring[(r + half) % (2 * half + 1)], padded[half:], kernel[0])
+            _weighted(ring[(r + half) % (2 * half + 1)], padded[half:], spread[0])
             for t in range(1, half + 1):
-                _add_pair(ring[(r + half) % (2 * half + 1)], padded[half - t :], padded[half + t :], kernel[t])
+                _add_pair(ring[(r + half) % (2 * half + 1)], padded[half - t :], padded[half + t :], spread[t])
             centre = r - half
             if centre < 0:
                 continue
-            _weighted(line, ring[(centre + half) % (2 * half + 1)], kernel[0])
+            _weighted(line, ring[(centre + half) % (2 * half + 1)], spread[0])
             for t in range(1, half + 1):
                 before, after = (centre - t + half) % (2 * half + 1), (centre + t + half) % (2 * half + 1)
-                _add_pair(line, ring[before], ring[after], kernel[t])
+                _add_pair(line, ring[before], ring[after], spread[t])
             start = int(uniform(key, (1 << 40) + b * rows + centre) * _NOISE)
             for c in range(columns):
                 value = line[c] + grain[(start + c) & (_NOISE - 1)] + np.float32(0.5)
@@ -281,11 +271,13 @@ def _expose(values: NDArray[np.uint8], kernel: NDArray[np.float32], noise: float
 
 @kernel
 def _weighted(out: NDArray[np.float32], values: NDArray[np.float32], weight: float) -> None:
+    """Set a line to weighted values."""
     for c in range(len(out)):
         out[c] = weight * values[c]
 
 
 @kernel
 def _add_pair(out: NDArray[np.float32], before: NDArray[np.float32], after: NDArray[np.float32], weight: float) -> None:
+    """Add the weighted sum of two lines."""
     for c in range(len(out)):
         out[c] += weight * (before[c] + after[c])

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from ..geodata.raster import Grid
+from ..geodata.raster import Frame, Grid
 from .solids import Body
-from .world import World, ground_at
+from .world import Relief, World, ground_at
 
 __all__ = ["Surface", "rasterise"]
 
@@ -40,8 +40,8 @@ class Surface:
 def rasterise(world: World, grid: Grid, tile: NDArray[np.float32]) -> Surface:
     """Return the highest surface on a grid; `tile` is the noise that roughens leaves."""
     terrain = world.terrain
-    frame = (grid.west, grid.north, grid.gsd)
-    z = _bare(grid.shape, frame, terrain.values, (terrain.grid.west, terrain.grid.north, terrain.grid.gsd))
+    frame = grid.frame
+    z = _bare(frame, Relief.of(terrain))
     label = np.zeros(grid.shape, dtype=np.int32)
     solids = world.solids
     _raise_solids(z, label, frame, solids.rectangle, solids.planes, solids.body, tile)
@@ -50,17 +50,13 @@ def rasterise(world: World, grid: Grid, tile: NDArray[np.float32]) -> Surface:
 
 
 @kernel
-def _bare(
-    shape: tuple[int, int],
-    frame: tuple[float, float, float],
-    values: NDArray[np.float32],
-    raster: tuple[float, float, float],
-) -> NDArray[np.float32]:
-    z = np.empty(shape, dtype=np.float32)
-    for r in range(shape[0]):
-        y = frame[1] - (r + 0.5) * frame[2]
-        for c in range(shape[1]):
-            z[r, c] = ground_at(values, raster[0], raster[1], raster[2], frame[0] + (c + 0.5) * frame[2], y)
+def _bare(frame: Frame, relief: Relief) -> NDArray[np.float32]:
+    """Return the elevation of the bare earth in each cell."""
+    z = np.empty((frame.rows, frame.columns), dtype=np.float32)
+    for r in range(frame.rows):
+        y = frame.north - (r + 0.5) * frame.gsd
+        for c in range(frame.columns):
+            z[r, c] = ground_at(relief, frame.west + (c + 0.5) * frame.gsd, y)
     return z
 
 
@@ -68,13 +64,13 @@ def _bare(
 def _raise_solids(
     z: NDArray[np.float32],
     label: NDArray[np.int32],
-    frame: tuple[float, float, float],
+    frame: Frame,
     rectangle: NDArray[np.float64],
     planes: NDArray[np.float64],
     body: NDArray[np.uint8],
     tile: NDArray[np.float32],
 ) -> None:
-    west, north, gsd = frame
+    west, north, gsd, _, _ = frame
     mask = tile.shape[0] - 1
     for k in range(len(rectangle)):
         x0, y0, angle, length, width = rectangle[k]
@@ -107,11 +103,11 @@ def _raise_solids(
 def _raise_blobs(
     z: NDArray[np.float32],
     label: NDArray[np.int32],
-    frame: tuple[float, float, float],
+    frame: Frame,
     blobs: NDArray[np.float64],
     tile: NDArray[np.float32],
 ) -> None:
-    west, north, gsd = frame
+    west, north, gsd, _, _ = frame
     mask = tile.shape[0] - 1
     for k in range(len(blobs)):
         x0, y0, z0, across, up = blobs[k]

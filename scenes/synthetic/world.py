@@ -6,12 +6,14 @@ Local world coordinates: x east, y north from the lower left corner of the exten
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from ..geodata.raster import Elevation
+from ..geodata.raster import Elevation, Frame
+from ..geodata.sampling import bilinear_at
 from .buildings import build
 from .clutter import patch_table, scatter
 from .layout import Layout, plan_layout
@@ -21,7 +23,7 @@ from .solids import Body, Solids
 from .terrain import natural_terrain, terraced
 from .vegetation import Trees, grow
 
-__all__ = ["CellIndex", "World", "ground_at", "make_world"]
+__all__ = ["CellIndex", "CellLists", "Relief", "World", "ground_at", "make_world"]
 
 _CELL = 4.0
 #: Objects are listed in the cells within this distance, so that a path sampled every 2 m cannot slip past one.
@@ -70,16 +72,33 @@ def make_world(recipe: SceneParameters, seed: int) -> World:
     return World(recipe, seed, terrain, layout, Solids.of([*town.solids, *clutter]), trees, patch_table(patches))
 
 
+class Relief(NamedTuple):
+    """An elevation as kernels take it."""
+
+    values: NDArray[np.float32]
+    frame: Frame
+
+    @classmethod
+    def of(cls, elevation: Elevation) -> Relief:
+        """Return the relief of an elevation."""
+        return cls(elevation.values, elevation.grid.frame)
+
+
 @kernel
-def ground_at(values: NDArray[np.float32], west: float, north: float, gsd: float, x: float, y: float) -> float:
-    """Bilinear elevation, clamped at the border (the kernel form of `Elevation.sample`)."""
-    row = min(max((north - y) / gsd - 0.5, 0.0), values.shape[0] - 1.001)
-    column = min(max((x - west) / gsd - 0.5, 0.0), values.shape[1] - 1.001)
-    i, j = int(row), int(column)
-    down, right = row - i, column - j
-    upper = values[i, j] * (1 - right) + values[i, j + 1] * right
-    lower = values[i + 1, j] * (1 - right) + values[i + 1, j + 1] * right
-    return upper * (1 - down) + lower * down  # type: ignore[no-any-return]
+def ground_at(relief: Relief, x: float, y: float) -> float:
+    """Return the elevation at a place, bilinear, clamped at the border."""
+    return float(bilinear_at(relief.values, relief.frame.west, relief.frame.north, relief.frame.gsd, x, y))
+
+
+class CellLists(NamedTuple):
+    """A `CellIndex` as kernels take it; `highest` is the highest elevation of any object."""
+
+    start: NDArray[np.int64]
+    items: NDArray[np.int32]
+    top: NDArray[np.float64]
+    highest: float
+    columns: int
+    rows: int
 
 
 @dataclass(frozen=True)
@@ -103,9 +122,9 @@ class CellIndex:
     top: NDArray[np.float64]
 
     @property
-    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64], float]:
-        """What kernels take: start, items, top, and the highest elevation of all."""
-        return self.start, self.items, self.top, float(self.top.max())
+    def lists(self) -> CellLists:
+        """The index for kernels."""
+        return CellLists(self.start, self.items, self.top, float(self.top.max()), self.columns, self.rows)
 
     @classmethod
     def of(cls, recipe: SceneParameters, boxes: NDArray[np.float64], top: NDArray[np.float64]) -> CellIndex:
