@@ -156,6 +156,7 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
     stored = store.statuses(unique)
     good = [run_id for run_id, status, _ in stored.values() if status == "ok"]
     evaluated = {keyed.key: store.evaluated(good, keyed.key) for keyed in evaluators}
+    failures = {keyed.key: store.evaluation_failures(good, keyed.key) for keyed in evaluators}
     runs = []
     for key, (identity, entry, scene) in unique.items():
         run_id, status, reason = stored.get(key, (None, None, ""))
@@ -177,6 +178,8 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
             if missing:
                 todo = "evaluate"
                 why += ", not yet evaluated by " + ", ".join(keyed.label for keyed in missing)
+                reasons = [failures[keyed.key][run_id] for keyed in missing if run_id in failures[keyed.key]]
+                why += f" (failed before: {'; '.join(reasons)})" if reasons else ""
         if only_failed and status != "failed":
             todo = "nothing"
         runs.append(

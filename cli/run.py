@@ -115,8 +115,9 @@ def run(
             if number:
                 typer.echo()
             print_leaderboard(board, table_console())
-        print_unsuccessful(unsuccessful_runs(result.rows), console)
-        if result.failed:
+        unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
+        print_unsuccessful([*unsuccessful_runs(result.rows), *unevaluated], console)
+        if result.failed or unevaluated:
             raise typer.Exit(3)
         if not any(entry.scenes for board in boards for entry in board.entries):
             raise typer.Exit(4)

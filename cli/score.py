@@ -8,7 +8,7 @@ import typer
 
 from . import completion
 from .command import load_plugins
-from .console import table_console
+from .console import messages, table_console
 from .options import DEFAULT_STORE, DetectorsOption, IndexOption, PluginOption, ScenesOption, StoreOption
 
 __all__ = ["score"]
@@ -31,13 +31,16 @@ def score(
     store: StoreOption = DEFAULT_STORE,
     plugin: PluginOption = None,
 ) -> None:
-    """Evaluate stored detections with other evaluators and print their leaderboards; no detector runs again."""
+    """Evaluate stored detections with other evaluators and print their leaderboards; no detector runs again.
+
+    Exit code 3 when an evaluator failed on a run, 4 when there is nothing to evaluate.
+    """
     from ..benchmark.analysis.leaderboard import make_leaderboard
     from ..benchmark.execution.runner import score_stored
     from ..benchmark.plan import KeyedEvaluator
     from ..benchmark.store.writer import Store
     from ..evaluators.registry import make_evaluator
-    from ..reports.leaderboard_text import print_leaderboard
+    from ..reports.leaderboard_text import print_leaderboard, print_unsuccessful
 
     load_plugins(plugin)
     evaluators = tuple(KeyedEvaluator.of(make_evaluator(name)) for name in evaluator)
@@ -49,8 +52,15 @@ def score(
             for run_id in good:
                 if run_id not in known:
                     score_stored(opened, run_id, (keyed,))
-        for keyed in evaluators:
-            board = make_leaderboard(rows, opened, keyed, title=f"Stored runs of {store}", rank_by=index)
+        boards = [
+            make_leaderboard(rows, opened, keyed, title=f"Stored runs of {store}", rank_by=index)
+            for keyed in evaluators
+        ]
+        for board in boards:
             print_leaderboard(board, table_console())
+    unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
+    print_unsuccessful(unevaluated, messages())
+    if unevaluated:
+        raise typer.Exit(3)
     if not good:
         raise typer.Exit(4)

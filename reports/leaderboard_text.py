@@ -127,7 +127,7 @@ def print_unsuccessful(runs: Sequence[UnsuccessfulRun], console: Console) -> Non
     for run in runs:
         console.print(
             Text.assemble(
-                (run.status, "red" if run.status == "failed" else "yellow"),
+                (run.status, "yellow" if run.status == "skipped" else "red"),
                 f" {run.label} on {run.scene}, seed {run.seed}: {run.reason}\n",
                 (f"  repeat: {run.command}", "dim"),
             ),

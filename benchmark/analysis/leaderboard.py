@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import shlex
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -54,6 +54,7 @@ def make_leaderboard(
     over other scenes than those of the other detectors.
     """
     evaluations = store.evaluations([row.id for row in rows if row.status == "ok"], keyed.evaluator, keyed.key)
+    failures = store.evaluation_failures([row.id for row in rows if row.status == "ok"], keyed.key)
     counts = store.reference_counts()
     bare = tuple(dict.fromkeys(row.scene for row in rows if counts.get(row.scene_id, 0) is None))
     rows = [row for row in rows if row.scene not in bare]
@@ -90,7 +91,7 @@ def make_leaderboard(
         entries=tuple(entries),
         scenes=scenes,
         notes=tuple(notes),
-        unsuccessful=unsuccessful_runs(rows),
+        unsuccessful=(*unsuccessful_runs(rows), *_unevaluated(rows, keyed, failures)),
     )
 
 
@@ -116,7 +117,8 @@ class _Tally:
     @property
     def scenes(self) -> int:
         """Number of scenes on which all runs have a result."""
-        return len({row.scene for row in self._evaluated} - {row.scene for row in self.rows if row.status != "ok"})
+        done = {row.id for row in self._evaluated}
+        return len({row.scene for row in self._evaluated} - {row.scene for row in self.rows if row.id not in done})
 
     def pooled(self, index: Index) -> Cell:
         """Return the ratio of the tallies of all runs, with its interval over resampled scenes."""
@@ -243,6 +245,23 @@ def unsuccessful_runs(rows: Iterable[RunRow]) -> tuple[UnsuccessfulRun, ...]:
         )
         for row in found
     )
+
+
+def _unevaluated(
+    rows: Iterable[RunRow], keyed: KeyedEvaluator, failures: Mapping[int, str]
+) -> Iterator[UnsuccessfulRun]:
+    """Yield the runs on which the evaluator failed, with the command that evaluates them."""
+    _, bracket, changed = keyed.label.partition("[")
+    for row in rows:
+        if row.id in failures:
+            yield UnsuccessfulRun(
+                status="not evaluated",
+                label=row.label,
+                scene=row.scene,
+                seed=row.seed,
+                reason=f"{keyed.label}: {failures[row.id]}",
+                command=shlex.join(["roofbench", "score", "-e", keyed.recipe.use + bracket + changed]),
+            )
 
 
 def repeat_command(row: RunRow) -> str:

@@ -19,11 +19,12 @@ import tempfile
 import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import IO
 
-from ..store.outcomes import Cost, Outcome
+from ..store.outcomes import Cost, Outcome, ScoreFailure
 from .memory import bound_allocations, highest_memory
+from .tasks import Task
 
 __all__ = [
     "THREAD_LIMITS",
@@ -72,6 +73,7 @@ class IsolatedProcess:
         self._python_path = python_path
         self._process: subprocess.Popen[bytes] | None = None
         self._errors: IO[bytes] | None = None
+        self._detected: bytes | None = None
 
     def call(self, task: str, limits: Limits) -> bytes:
         """Run a task and return its outcome as bytes; a crash or an exceeded limit is a failed outcome."""
@@ -84,22 +86,26 @@ class IsolatedProcess:
             bound_allocations(process.pid, limits.memory)
         started = time.monotonic()
         peak = 0
+        self._detected = None
         try:
             _send(process.stdin, task.encode())
             deadline = None if limits.seconds is None else started + limits.seconds
             receiver = _Receiver(process.stdout)
             while (message := receiver.poll(_pause(limits, deadline))) is None:
+                self._detected = receiver.preliminary
                 peak = highest_memory(process.pid)
                 if deadline is not None and time.monotonic() > deadline:
-                    return self._failed(process, f"time limit of {limits.seconds:g} s exceeded", started, peak)
+                    return self._failed(
+                        process, task, f"time limit of {limits.seconds:g} s exceeded", started=started, peak=peak
+                    )
                 if limits.memory is not None and peak > limits.memory:
-                    return self._failed(process, _too_much(peak, limits.memory), started, peak)
+                    return self._failed(process, task, _too_much(peak, limits.memory), started=started, peak=peak)
             peak = highest_memory(process.pid)
             if limits.memory is not None and peak > limits.memory:  # a peak between two checks
-                return self._failed(process, _too_much(peak, limits.memory), started, peak)
+                return self._failed(process, task, _too_much(peak, limits.memory), started=started, peak=peak)
             return message
         except (EOFError, OSError, ValueError):  # ValueError: the stream was closed
-            return self._failed(process, None, started, peak)
+            return self._failed(process, task, None, started=started, peak=peak)
 
     def close(self) -> None:
         """End the process."""
@@ -113,7 +119,9 @@ class IsolatedProcess:
                     with suppress(OSError):
                         stream.close()
 
-    def _failed(self, process: subprocess.Popen[bytes], reason: str | None, started: float, peak: int) -> bytes:
+    def _failed(
+        self, process: subprocess.Popen[bytes], task: str, reason: str | None, *, started: float, peak: int
+    ) -> bytes:
         if reason is None:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(timeout=5)
@@ -124,6 +132,8 @@ class IsolatedProcess:
                 self._errors.seek(0)
                 written = self._errors.read()[-4000:].decode(errors="replace")
         self.close()
+        if self._detected is not None:
+            return _unevaluated(self._detected, task, reason).to_bytes()
         cost = Cost(seconds=time.monotonic() - started, peak_memory=peak)
         return Outcome(status="failed", reason=reason, traceback=written, cost=cost).to_bytes()
 
@@ -146,6 +156,17 @@ class IsolatedProcess:
                 start_new_session=True,  # Ctrl-C reaches the caller only, which ends its workers
             )
         return self._process
+
+
+def _unevaluated(detected: bytes, task: str, reason: str) -> Outcome:
+    """Return the outcome of a process that ended during the evaluation: the detections, and no score."""
+    done, asked = Outcome.from_bytes(detected), Task.from_json(task)
+    codes = asked.codes or ("",) * len(asked.evaluators)
+    failures = (
+        ScoreFailure(evaluator=recipe, code=code, reason=reason)
+        for recipe, code in zip(asked.evaluators, codes, strict=True)
+    )
+    return replace(done, score_failures=tuple(failures))
 
 
 def _pause(limits: Limits, deadline: float | None) -> float:
@@ -204,12 +225,17 @@ def serve() -> None:
     from .worker import execute_text
 
     while True:
-        _send(outward, execute_text(tasks.get().decode()))
+        message = execute_text(tasks.get().decode(), lambda detected: _send(outward, detected, preliminary=True))
+        _send(outward, message)
 
 
-def _send(stream: IO[bytes] | None, message: bytes) -> None:
+#: Bit of a message's size that marks an outcome before its evaluation.
+_PRELIMINARY = 1 << 63
+
+
+def _send(stream: IO[bytes] | None, message: bytes, *, preliminary: bool = False) -> None:
     assert stream is not None
-    stream.write(struct.pack("<Q", len(message)))
+    stream.write(struct.pack("<Q", len(message) | (_PRELIMINARY if preliminary else 0)))
     stream.write(message)
     stream.flush()
 
@@ -227,13 +253,14 @@ def _exactly(stream: IO[bytes], size: int) -> bytes:
 
 
 class _Receiver:
-    """A message that arrives in pieces."""
+    """A message that arrives in pieces, and the preliminary one before it."""
 
     def __init__(self, stream: IO[bytes] | None) -> None:
         assert stream is not None
         self._descriptor = stream.fileno()
         self._data = bytearray()
         self._size: int | None = None
+        self.preliminary: bytes | None = None
 
     def poll(self, seconds: float) -> bytes | None:
         """Wait for at most this time; return the message when it is complete."""
@@ -245,9 +272,16 @@ class _Receiver:
         if not piece:
             raise EOFError
         self._data += piece
-        if self._size is None and len(self._data) >= 8:
-            (self._size,) = struct.unpack("<Q", self._data[:8])
-            del self._data[:8]
-        if self._size is not None and len(self._data) >= self._size:
-            return bytes(self._data)
-        return None
+        while True:
+            if self._size is None and len(self._data) >= 8:
+                (self._size,) = struct.unpack("<Q", self._data[:8])
+                del self._data[:8]
+            if self._size is None or len(self._data) < self._size & ~_PRELIMINARY:
+                return None
+            size = self._size & ~_PRELIMINARY
+            message = bytes(self._data[:size])
+            if self._size == size:
+                return message
+            self.preliminary = message
+            del self._data[:size]
+            self._size = None

@@ -22,7 +22,7 @@ from .dispatch import Dispatcher
 from .executors import InProcess, Slot, cluster_slot, local_slots
 from .isolation import Limits, call_isolated
 from .tasks import Task
-from .worker import execute
+from .worker import execute, score
 
 __all__ = ["Execution", "RunResult", "run_plan", "score_stored"]
 
@@ -57,7 +57,7 @@ class RunResult:
     done : int
         Number of runs that were executed now.
     evaluated : int
-        Number of stored runs that were evaluated now.
+        Number of evaluations of stored runs that were added now.
     """
 
     rows: tuple[RunRow, ...]
@@ -104,8 +104,7 @@ def run_plan(
     for run in plan.runs:
         if run.todo == "evaluate":
             assert run.stored is not None
-            score_stored(store, run.stored, run.missing)
-            evaluated += 1
+            evaluated += score_stored(store, run.stored, run.missing)
     waiting = [run for run in plan.runs if run.todo == "detect"]
     done = 0
     for run, outcome in _outcomes(waiting, plan, store, execution):
@@ -121,16 +120,23 @@ def run_plan(
 def score_stored(store: Store, run_id: int, evaluators: tuple[KeyedEvaluator, ...]) -> int:
     """Evaluate stored detections by further evaluators, without detecting again and without opening the scene.
 
-    Returns the number of added evaluations: none for a scene without reference.
+    Returns the number of added evaluations: none for a scene without reference. An evaluator that fails is stored as a
+    failure, and the others continue.
     """
     scene = store.scene(store.run(run_id).scene_id)
     if scene.reference is None:
         return 0
-    detected = store.detections(run_id)
+    detected, added = store.detections(run_id), 0
     for keyed in evaluators:
-        evaluation = keyed.evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.grid)
-        store.add_score(run_id, Score.of(evaluation, keyed.recipe, keyed.code))
-    return len(evaluators)
+        result = score(
+            detected, scene.reference, keyed.recipe, keyed.code, keyed.evaluator, area=scene.area, grid=scene.grid
+        )
+        if isinstance(result, Score):
+            store.add_score(run_id, result)
+            added += 1
+        else:
+            store.add_score_failure(run_id, result)
+    return added
 
 
 def _outcomes(

@@ -8,28 +8,30 @@ import platform
 import time
 import traceback
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from typing import Any
 
 import numpy as np
 import shapely
+from shapely import Geometry
 
 from ...core.errors import RoofbenchError
 from ...detectors.base import Detector
 from ...detectors.checks import checked_output
 from ...evaluators.base import Evaluator
 from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..identity.keys import random_stream_entropy
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
-from ..store.outcomes import Cost, Outcome, SceneRecord, Score, plain_value
+from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure, plain_value
 from .memory import highest_memory, reset_highest_memory
 from .scene_picture import scene_picture
 from .tasks import Task
 
-__all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream"]
+__all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream", "score"]
 
 #: The scenes opened last; consecutive tasks of a plan often use the same scene.
 _scenes: OrderedDict[str, Scene] = OrderedDict()
@@ -51,9 +53,14 @@ def random_stream(seed: int, scene: Scene, detector: Detector) -> np.random.Gene
     return np.random.default_rng(np.random.SeedSequence(random_stream_entropy(seed, scene.name, detector.name)))
 
 
-def execute_text(task: str) -> bytes:
-    """Run a task given as text, the form in which tasks are sent between processes."""
-    return execute(Task.from_json(task)).to_bytes()
+def execute_text(task: str, detected: Callable[[bytes], None] | None = None) -> bytes:
+    """Run a task given as text, the form in which tasks are sent between processes; see `execute`."""
+
+    def forward(outcome: Outcome) -> None:
+        if detected is not None:
+            detected(outcome.to_bytes())
+
+    return execute(Task.from_json(task), detected=forward).to_bytes()
 
 
 def execute(
@@ -62,6 +69,7 @@ def execute(
     scene: Scene | None = None,
     detector: Detector | None = None,
     evaluators: Sequence[Evaluator] | None = None,
+    detected: Callable[[Outcome], None] | None = None,
 ) -> Outcome:
     """Run a task; a failure or a skip is an outcome, too.
 
@@ -70,6 +78,8 @@ def execute(
     task : Task
     scene, detector, evaluators : optional
         The objects themselves, where task and caller share a process.
+    detected : callable, optional
+        Called with the outcome as it is before the evaluation, so that a crash of an evaluator loses no detection.
     """
     started = time.perf_counter(), time.process_time()
     reset_highest_memory()  # a limit applies to this run, not to earlier ones
@@ -86,42 +96,64 @@ def execute(
         _read(visible)
         reset_highest_memory()
         started = time.perf_counter(), time.process_time()
-        detected = detect(scene, detector, seed=task.seed)
+        found = detect(scene, detector, seed=task.seed)
         cost = _cost_since(started)
         codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
-        scores = score(detected, scene, list(zip(task.evaluators, codes, evaluators, strict=True)))
     except Exception as error:
-        reason = str(error) if isinstance(error, RoofbenchError) else f"{type(error).__name__}: {error}"
-        if isinstance(error, MemoryError):
-            reason = f"out of memory: {error}".rstrip(": ")
         return Outcome(
             status="failed",
-            reason=" ".join(reason.split())[:500],
+            reason=reason_of(error),
             traceback=traceback.format_exc(),
             cost=_cost_since(started),
             machine=machine_facts(),
         )
-    return Outcome(
+    outcome = Outcome(
         status="ok",
         cost=cost,
-        detections=tuple(shapely.to_wkb(detected.polygons).tolist()),
-        attributes={name: [plain_value(value) for value in column] for name, column in detected.attributes.items()},
-        metadata={**detected.metadata, **({"repairs": [str(r) for r in detected.repairs]} if detected.repairs else {})},
-        scores=tuple(scores),
+        detections=tuple(shapely.to_wkb(found.polygons).tolist()),
+        attributes={name: [plain_value(value) for value in column] for name, column in found.attributes.items()},
+        metadata={**found.metadata, **({"repairs": [str(r) for r in found.repairs]} if found.repairs else {})},
         scene=record,
         machine=machine_facts(),
     )
+    if scene.reference is None or not evaluators:
+        return outcome
+    if detected is not None:
+        detected(outcome)
+    results = [
+        score(found, scene.reference, recipe, code, evaluator, area=scene.area, grid=scene.evaluation_grid)
+        for recipe, code, evaluator in zip(task.evaluators, codes, evaluators, strict=True)
+    ]
+    return dataclasses.replace(
+        outcome,
+        scores=tuple(result for result in results if isinstance(result, Score)),
+        score_failures=tuple(result for result in results if isinstance(result, ScoreFailure)),
+    )
 
 
-def score(detected: Footprints, scene: Scene, evaluators: list[tuple[PluginRecipe, str, Evaluator]]) -> list[Score]:
-    """Return the score by each evaluator; none for a scene without reference."""
-    if scene.reference is None:
-        return []
-    scores = []
-    for recipe, code, evaluator in evaluators:
-        evaluation = evaluator.evaluate(detected, scene.reference, area=scene.area, grid=scene.evaluation_grid)
-        scores.append(Score.of(evaluation, recipe, code))
-    return scores
+def score(
+    detected: Footprints,
+    reference: Footprints,
+    recipe: PluginRecipe,
+    code: str,
+    evaluator: Evaluator,
+    *,
+    area: Geometry | None,
+    grid: Grid | None,
+) -> Score | ScoreFailure:
+    """Return the score by an evaluator, or its failure; `code` is the digest of its source."""
+    try:
+        return Score.of(evaluator.evaluate(detected, reference, area=area, grid=grid), recipe, code)
+    except Exception as error:
+        return ScoreFailure(evaluator=recipe, code=code, reason=reason_of(error))
+
+
+def reason_of(error: Exception) -> str:
+    """Return an error of a detector or an evaluator as one line."""
+    reason = str(error) if isinstance(error, RoofbenchError) else f"{type(error).__name__}: {error}"
+    if isinstance(error, MemoryError):
+        reason = f"out of memory: {error}".rstrip(": ")
+    return " ".join(reason.split())[:500]
 
 
 def describe(scene: Scene) -> SceneRecord:

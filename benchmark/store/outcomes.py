@@ -21,7 +21,7 @@ from ...evaluators.base import Evaluation
 from ...scenes.geodata.footprints import Footprints
 from ..identity.recipes import PluginRecipe
 
-__all__ = ["Cost", "Outcome", "SceneRecord", "Score", "Status", "footprints_of", "plain_value"]
+__all__ = ["Cost", "Outcome", "SceneRecord", "Score", "ScoreFailure", "Status", "footprints_of", "plain_value"]
 
 Status = Literal["ok", "failed", "skipped"]
 
@@ -81,6 +81,24 @@ class Score:
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class ScoreFailure:
+    """An evaluator that failed on the detections of a run, which are stored all the same.
+
+    Attributes
+    ----------
+    evaluator : PluginRecipe
+    code : str
+        Digest of the evaluator's source closure.
+    reason : str
+        One sentence.
+    """
+
+    evaluator: PluginRecipe
+    code: str
+    reason: str
+
+
 def plain_value(value: Any) -> Any:
     """Return a value as Python number, text or None; NaN becomes None."""
     if isinstance(value, np.generic):
@@ -131,6 +149,8 @@ class Outcome:
     metadata : mapping
         Facts about the whole set, and repairs.
     scores : tuple of Score
+    score_failures : tuple of ScoreFailure
+        Evaluators that failed; the others have their score.
     scene : SceneRecord, optional
     machine : mapping
         Facts about the machine.
@@ -144,6 +164,7 @@ class Outcome:
     attributes: Mapping[str, list[Any]] = field(default_factory=dict)
     metadata: Mapping[str, Any] = field(default_factory=dict)
     scores: tuple[Score, ...] = ()
+    score_failures: tuple[ScoreFailure, ...] = ()
     scene: SceneRecord | None = None
     machine: Mapping[str, Any] = field(default_factory=dict)
 
@@ -154,6 +175,9 @@ class Outcome:
         header["scores"] = [
             {**_fields(score), "evaluator": score.evaluator.to_dict(), "verdicts": len(score.verdicts)}
             for score in self.scores
+        ]
+        header["score_failures"] = [
+            {**_fields(failure), "evaluator": failure.evaluator.to_dict()} for failure in self.score_failures
         ]
         blobs = [*self.detections, *(table for score in self.scores for table in score.verdicts)]
         header["detections"] = len(self.detections)
@@ -186,6 +210,10 @@ class Outcome:
             recipe, notes = PluginRecipe(**score["evaluator"]), tuple(score["notes"])
             scores.append(Score(**{**score, "evaluator": recipe, "notes": notes, "verdicts": tables}))
         header["scores"] = tuple(scores)
+        header["score_failures"] = tuple(
+            ScoreFailure(**{**failure, "evaluator": PluginRecipe(**failure["evaluator"])})
+            for failure in header.get("score_failures", ())
+        )
         if header["scene"] is not None:
             record = header["scene"]
             if record["reference"] is not None:

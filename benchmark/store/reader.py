@@ -61,6 +61,12 @@ class StoreReader:
         rows = self._db.execute("SELECT run_id FROM evaluations WHERE key = ?", (key,))
         return wanted & {int(row["run_id"]) for row in rows}
 
+    def evaluation_failures(self, run_ids: Iterable[int], key: str) -> dict[int, str]:
+        """Return the reasons of those of these runs on which the evaluator of that key failed, by run id."""
+        wanted = set(run_ids)
+        rows = self._db.execute("SELECT run_id, reason FROM evaluation_failures WHERE key = ?", (key,))
+        return {int(row["run_id"]): str(row["reason"]) for row in rows if row["run_id"] in wanted}
+
     def described_scenes(self) -> set[str]:
         """Return the keys of the scenes whose content and reference are stored."""
         return {str(row[0]) for row in self._db.execute("SELECT key FROM scenes WHERE content_hash IS NOT NULL")}

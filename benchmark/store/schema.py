@@ -13,7 +13,7 @@ from ...core.errors import InputError
 
 __all__ = ["VERSION", "prepare"]
 
-VERSION = 3
+VERSION = 4
 
 #: One script per version: MIGRATIONS[n] leads from version n to n + 1.
 MIGRATIONS: tuple[str, ...] = (
@@ -136,6 +136,14 @@ MIGRATIONS: tuple[str, ...] = (
         side TEXT NOT NULL CHECK (side IN ('detection', 'reference')),
         content BLOB NOT NULL,            -- VerdictTable.to_bytes
         PRIMARY KEY (evaluation_id, side)
+    );
+    """,
+    """
+    CREATE TABLE evaluation_failures (
+        run_id INTEGER NOT NULL REFERENCES runs ON DELETE CASCADE,
+        key TEXT NOT NULL,                -- digest of evaluator, parameters and code
+        reason TEXT NOT NULL,
+        PRIMARY KEY (run_id, key)
     );
     """,
 )

@@ -19,7 +19,7 @@ from ...evaluators.verdict_table import SIDES
 from ..identity.keys import SourceClosure, canonical
 from ..identity.recipes import SceneRecipe
 from .database import connect
-from .outcomes import Outcome, SceneRecord, Score
+from .outcomes import Outcome, SceneRecord, Score, ScoreFailure
 from .reader import StoreReader
 from .records import RunIdentity, RunRow, StoredScene, evaluation_key
 
@@ -113,6 +113,8 @@ class Store(StoreReader):
             )
             for score in outcome.scores:
                 self._score(run_id, score)
+            for failure in outcome.score_failures:
+                self._score_failure(run_id, failure)
         return run_id
 
     def add_score(self, run_id: int, score: Score) -> None:
@@ -120,8 +122,18 @@ class Store(StoreReader):
         with self._transaction():
             self._score(run_id, score)
 
+    def add_score_failure(self, run_id: int, failure: ScoreFailure) -> None:
+        """Store that an evaluator failed on a stored run, with its reason."""
+        with self._transaction():
+            self._score_failure(run_id, failure)
+
+    def _score_failure(self, run_id: int, failure: ScoreFailure) -> None:
+        key = evaluation_key(failure.evaluator, failure.code)
+        self._db.execute("INSERT OR REPLACE INTO evaluation_failures VALUES (?, ?, ?)", (run_id, key, failure.reason))
+
     def _score(self, run_id: int, score: Score) -> None:
         key = evaluation_key(score.evaluator, score.code)
+        self._db.execute("DELETE FROM evaluation_failures WHERE run_id = ? AND key = ?", (run_id, key))
         cursor = self._db.execute(
             """INSERT OR IGNORE INTO evaluations (run_id, key, evaluator, parameters, code, tallies, notes)
                VALUES (?,?,?,?,?,?,?)""",

@@ -11,7 +11,19 @@ import shapely
 import roofbench as rb
 
 #: Packages that take long to load, or that an environment for evaluation alone lacks.
-HEAVY = ("numba", "llvmlite", "pandas", "geopandas", "pyarrow", "matplotlib", "rasterio", "cv2", "scipy", "laspy", "PIL")
+HEAVY = (
+    "numba",
+    "llvmlite",
+    "pandas",
+    "geopandas",
+    "pyarrow",
+    "matplotlib",
+    "rasterio",
+    "cv2",
+    "scipy",
+    "laspy",
+    "PIL",
+)
 #: Those that pyogrio loads by itself where they are installed.
 OF_PYOGRIO = {"pandas", "geopandas", "pyarrow"}
 
