@@ -19,6 +19,10 @@ EVALUATORS = Registry(
     Evaluator,
     {
         DEFAULT: "evaluators.threshold_free.evaluator:ThresholdFree",
+        "mobj0": "evaluators.mobj0:Mobj0",
+        "rutzinger": "evaluators.rutzinger:Rutzinger",
+        "shan-lee": "evaluators.shan_lee:ShanLee",
+        "shufelt": "evaluators.shufelt:Shufelt",
     },
 )
 

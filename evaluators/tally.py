@@ -69,7 +69,7 @@ class Histogram:
         """Count values; NaN is not counted."""
         array = np.asarray(values, dtype=np.float64).ravel()
         array = array[~np.isnan(array)]
-        place = np.clip(np.floor((array - low) / (high - low) * bins), 0, bins - 1).astype(np.int64)
+        place = np.clip(np.floor(np.round((array - low) / (high - low) * bins, 9)), 0, bins - 1).astype(np.int64)
         sums: NDArray[np.float64] = np.bincount(place, weights=array, minlength=bins).astype(np.float64)
         return cls(low, high, np.bincount(place, minlength=bins), sums)
 
