@@ -260,7 +260,7 @@ def _folder_entry(folder: Path) -> Entry:
     return Entry(
         kind="scenes",
         name=str(folder),
-        meaning=f"scene folder with {', '.join(scene.holdings)}",
+        meaning=f"scene folder with {', '.join(scene.contents)}",
         facts={"extent": f"{xmax - xmin:.0f} x {ymax - ymin:.0f} m", "image": "", "spacing": ""},
         example=f"roofbench scenes check {folder}",
     )

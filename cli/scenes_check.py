@@ -23,9 +23,9 @@ def check(
     """Check a scene folder and print its contents; exit code 2 when there is a problem."""
     from ..reports.scene_text import format_facts
     from ..scenes.checking import check_scene
-    from ..scenes.folder import seal_scene
+    from ..scenes.folder import update_checksums
 
-    for name in seal_scene(scene) if update else ():
+    for name in update_checksums(scene) if update else ():
         typer.echo(f"- {name} was edited; its new checksum is in the manifest", err=True)
     report = check_scene(scene)
     if form == "json":

@@ -137,4 +137,4 @@ def import_(
     )
     with import_progress() as (note, progress):
         scene = import_scene(output, request, overwrite=overwrite, note=None if quiet else note, progress=progress)
-    typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.holdings)}")
+    typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.contents)}")

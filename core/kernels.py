@@ -75,7 +75,7 @@ def kernel(function: Any = None, *, inline: str = "never") -> Any:
     """
     if function is None:
         return lambda function: kernel(function, inline=inline)
-    # Nobody takes the address of a kernel, so the wrapper for callers in C is not compiled.
+    # The address of a kernel is never taken, so the wrapper for callers in C is not compiled.
     compiled: Any = numba.njit(function, nogil=True, inline=inline, no_cfunc_wrapper=True)
     if isinstance(compiled, _Dispatcher):  # it is the function itself under NUMBA_DISABLE_JIT
         compiled._cache = _KernelCache(compiled, files=False)

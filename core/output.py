@@ -34,7 +34,7 @@ def check_target(path: Path, overwrite: bool) -> None:
 
 
 def check_folder(path: Path, overwrite: bool, *, holds: Sequence[str]) -> None:
-    """Raise `OutputError` when a folder cannot be written, or when replacing it would lose somebody else's files.
+    """Raise `OutputError` when a folder cannot be written, or when replacing it would delete files of others.
 
     Parameters
     ----------

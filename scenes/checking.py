@@ -59,14 +59,14 @@ def check_scene(path: str | os.PathLike[str]) -> SceneReport:
         for name in changed_files(path)
     ]
     facts: dict[str, dict[str, Any]] = {"scene": _scene_facts(scene)}
-    for kind in scene.holdings:
+    for kind in scene.contents:
         try:
             facts[kind], found = _part(kind, scene)
             problems.extend(found)
             problems.extend(_crs_problems(folder / FILES[kind], kind, scene.crs))
         except RoofbenchError as error:
             problems.append(str(error))
-    if not {"points", "image"} & set(scene.holdings):
+    if not {"points", "image"} & set(scene.contents):
         problems.append(f"{folder} holds neither points nor an orthoimage: no detector can run on it")
     for kind, text in manifest.get("derived", {}).items():
         facts.setdefault(kind, {})["derived"] = text

@@ -33,7 +33,16 @@ from .geodata.points import PointCloud
 from .geodata.raster import Elevation, Image
 from .scene import Scene
 
-__all__ = ["FILES", "HOLDS", "MANIFEST", "changed_files", "open_scene", "read_manifest", "save_scene", "seal_scene"]
+__all__ = [
+    "FILES",
+    "MANIFEST",
+    "SCENE_FILES",
+    "changed_files",
+    "open_scene",
+    "read_manifest",
+    "save_scene",
+    "update_checksums",
+]
 
 MANIFEST = "scene.toml"
 #: What a scene holds, and the file that holds it.
@@ -45,7 +54,7 @@ FILES: Mapping[str, str] = {
     "area": "area.gpkg",
 }
 #: Names in a scene folder, with the side files that a GIS leaves: a folder with any other is not replaced.
-HOLDS = (MANIFEST, *FILES.values(), "*.aux.xml", "*.ovr", "*.qmd", "*.qml", "*.gpkg-wal", "*.gpkg-shm", "*.lax")
+SCENE_FILES = (MANIFEST, *FILES.values(), "*.aux.xml", "*.ovr", "*.qmd", "*.qml", "*.gpkg-wal", "*.gpkg-shm", "*.lax")
 #: Version of the layout; raised when a folder of before cannot be read any more.
 _FORMAT = 1
 
@@ -92,7 +101,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, overwrite: bool = 
     OutputError
         The folder exists (without `overwrite`) or cannot be written.
     """
-    with whole_folder(path, holds=HOLDS, overwrite=overwrite) as folder:
+    with whole_folder(path, holds=SCENE_FILES, overwrite=overwrite) as folder:
         if scene.points is not None:
             from .geodata.las_files import write_points
 
@@ -150,7 +159,7 @@ def changed_files(path: str | os.PathLike[str]) -> list[str]:
     return [FILES[kind] for kind, entry in files.items() if _sha256(folder / FILES[kind]) != entry["sha256"]]
 
 
-def seal_scene(path: str | os.PathLike[str]) -> list[str]:
+def update_checksums(path: str | os.PathLike[str]) -> list[str]:
     """Take the files as they are now into the manifest, after an edit that is meant; return those that differed."""
     changed = changed_files(path)
     folder, manifest = read_manifest(path)

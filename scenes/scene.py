@@ -91,12 +91,12 @@ class Scene:
         self._is_for_detection = False
 
     @property
-    def holdings(self) -> tuple[str, ...]:
+    def contents(self) -> tuple[str, ...]:
         """What the scene holds, unread: some of ``points``, ``image``, ``dem``, ``reference``, ``area``."""
         return tuple(name for name, source in self._sources.items() if source is not None)
 
     def __repr__(self) -> str:
-        return f"<Scene {self.name}: {', '.join(self.holdings) or 'empty'}>"
+        return f"<Scene {self.name}: {', '.join(self.contents) or 'empty'}>"
 
     def _get(self, name: str) -> Any:
         value = self._sources[name]

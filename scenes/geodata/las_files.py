@@ -369,7 +369,7 @@ def _header_crs(file: Path, header: Any) -> str | None:
 
 
 def _refuse_feet(file: Path, header: Any) -> None:
-    """Refuse GeoKeys that name feet: their CRS code alone does not tell the unit of the heights."""
+    """Refuse GeoKeys that name feet: their CRS code alone does not define the unit of the heights."""
     if header.vlrs.get("WktCoordinateSystemVlr"):
         return
     for record in header.vlrs.get("GeoKeyDirectoryVlr"):

@@ -2,7 +2,7 @@
 
 A *point* is one return of a laser pulse: x (east), y (north), z (up) in metres; *return number* and *number of
 returns* count from 1 within its pulse; *classification* is the ASPRS code (2 ground, 6 building, 9 water). Detectors
-never see the classification: it is somebody's answer, not a measurement.
+never see the classification: it is an interpretation, not a measurement.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class PointCloud:
     x, y, z : ndarray of float64, shape (n,)
         Metres.
     return_number, number_of_returns : ndarray of uint8, shape (n,), optional
-        None when the file does not tell.
+        None when the file does not store them.
     intensity : ndarray of uint16, shape (n,), optional
     classification : ndarray of uint8, shape (n,), optional
     colour : ndarray of uint16, shape (n, 3) or (n, 4), optional

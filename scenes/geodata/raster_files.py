@@ -64,7 +64,7 @@ class RasterHeader:
     square : bool
         Whether the cells are square.
     height_unit : str, optional
-        Unit of the values of an elevation model where the file tells another one than metres.
+        Unit of the values of an elevation model where the file names another one than metres.
     scale, offset : float
         From the values in the file to heights: ``value * scale + offset``; mostly 1 and 0.
     alpha : bool

@@ -151,7 +151,7 @@ def _same_cells(one: Grid, two: Grid) -> bool:
 
 
 def resampling_note(header: RasterHeader, crs: str, grid: Grid) -> str | None:
-    """Return the sentence that tells how a file is brought to a scene's grid, or None when it is copied as it is."""
+    """Return a note on how a file is resampled to the grid of a scene; None when its cells are copied."""
     reasons = []
     if header.crs is not None and not same_crs(header.crs, crs):
         reasons.append(f"from {crs_label(header.crs)} to {crs_label(crs)}")

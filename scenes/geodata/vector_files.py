@@ -76,7 +76,7 @@ def read_footprints(
     layer : str, optional
         Layer name; not needed for a file of one layer.
     building_id : str, optional
-        Column that tells which footprints are parts of one building. Without it a column called ``building_id`` is
+        Column whose equal values mark the parts of one building. Without it a column called ``building_id`` is
         used where there is one, else every polygon is its own building. A row with no value is its own building.
     crs : str, optional
         CRS to assign, for files that have none or the wrong one; coordinates are not changed.

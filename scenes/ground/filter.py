@@ -1,4 +1,4 @@
-"""Bare earth from laser points: elevation models of ground points, and a ground filter where nobody told them apart.
+"""Bare earth from laser points: elevation models of ground points, and a ground filter for unclassified points.
 
 Nouns
 -----
@@ -34,7 +34,7 @@ __all__ = ["elevation_from_points", "fill_unknown", "ground_surface"]
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
 
-#: Size in metres of the blocks whose lowest heights tell the trend.
+#: Size in metres of the blocks whose lowest heights give the trend.
 _TREND_BLOCK = 5.0
 #: Windows up to this radius in metres remove what they remove, walls or not: shrubs and crowns have ragged borders.
 _NARROW = 6.0

@@ -1,7 +1,8 @@
-"""Outlines of classified points: a reference derived from what somebody classified as building.
+"""Outlines of classified points: a reference derived from points classified as building.
 
 The points of one class are put on cells, gaps between them are closed, and the regions are traced and simplified.
-Such outlines are as good as the classification and as the point spacing; whoever uses them says *derived*.
+Such outlines are as good as the classification and as the point spacing; scenes that use them call their reference
+*derived*.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import shapely
 
 from ...core.output import check_folder
-from ..folder import HOLDS, open_scene, save_scene
+from ..folder import SCENE_FILES, open_scene, save_scene
 from ..geodata.footprints import Footprints
 from ..geodata.las_files import LasHeader, read_las_header
 from ..geodata.points import PointCloud
@@ -82,7 +82,7 @@ def import_scene(
     >>> scene = import_scene("delft", request)  # doctest: +SKIP
     """
     target = Path(output)
-    check_folder(target, overwrite, holds=HOLDS)
+    check_folder(target, overwrite, holds=SCENE_FILES)
     log = ImportLog(note)
     clouds = [read_las_header(file) for file in request.point_files]
     images = [read_raster_header(file) for file in request.image_files]

@@ -38,7 +38,7 @@ class Town:
     Attributes
     ----------
     solids : tuple of Solid
-        Parts of buildings and their roof furniture; `Solid.owner` is the building number.
+        Parts of buildings and the structures on their roofs; `Solid.owner` is the building number.
     built : ndarray of bool, shape (sites,)
         Which sites carry a building.
     garages : tuple of Solid
@@ -88,9 +88,9 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
                 break
             _paint(group, rank, zone, recipe, Draws(colours[site][rank * 6 :]), Draws(greens[site][rank * 2 :]))
             floor = float(terrain.sample(group[0].x, group[0].y))
-            furniture = furnish(group, zone, Draws(roofs[site][rank * 48 :])) if rank == 0 else []
+            structures = furnish(group, zone, Draws(roofs[site][rank * 48 :])) if rank == 0 else []
             taken.add(group)
-            for solid in (*group, *furniture):
+            for solid in (*group, *structures):
                 solid.owner, solid.base = number, floor
                 solids.append(solid)
             if rank:

@@ -85,7 +85,7 @@ def scatter(
 
 
 def _clear_of_buildings(things: list[Solid], buildings: Sequence[Solid]) -> list[Solid]:
-    """Return the things that stand in no building, judged at points along their axis."""
+    """Return the things that stand in no building, tested at points along their axis."""
     steps = [max(2, math.ceil(thing.length / 2) + 1) for thing in things]
     starts = np.cumsum([0, *steps])[:-1]
     x, y = np.empty(sum(steps)), np.empty(sum(steps))

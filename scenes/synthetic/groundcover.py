@@ -1,7 +1,7 @@
 """Ground cover: streets, footpaths, verges, lawns and the patches of gardens and yards, as codes on a raster.
 
 Codes below 16 are rows of `palettes.GROUND` (see `clutter.Cover`); codes from 64 are grass, and their lower six bits
-tell how dry it is: every parcel has its own gardener.
+are its dryness, which differs from parcel to parcel.
 """
 
 from __future__ import annotations

@@ -172,7 +172,7 @@ def _zones(layout: Layout, recipe: SceneParameters, seed: int) -> NDArray[np.uin
 
 
 def _areas(layout: Layout, recipe: SceneParameters) -> NDArray[np.float64]:
-    """Return the area of each block inside the extent, m2, as the raster's cells tell it."""
+    """Return the area of each block inside the extent, m2, counted in cells of the raster."""
     grid = layout.u.grid
     x, y = grid.to_world(np.arange(grid.rows)[:, None] + 0.5, np.arange(grid.columns)[None, :] + 0.5)
     inside = (x > 0) & (x < recipe.width) & (y > 0) & (y < recipe.height)

@@ -43,7 +43,7 @@ _MOST = 5
 _MODES = {"first": 0, "last": 1, "all": 2}
 _CHUNK = 250_000
 _POOL = int(Cover.POOL)
-_BUILDING, _FURNITURE, _HEDGE = int(Body.BUILDING), int(Body.FURNITURE), int(Body.HEDGE)
+_BUILDING, _ROOF_STRUCTURE, _HEDGE = int(Body.BUILDING), int(Body.ROOF_STRUCTURE), int(Body.HEDGE)
 #: First extinction (to the first return) and later extinction, per metre of leaves.
 _DENSE, _LOOSE = 0.85, 0.42
 #: Extinction of what is left for the surface below a crown, per metre of leaves.
@@ -340,7 +340,7 @@ def _scan_chunk(
             if hit >= 0:
                 kind = standing.body[hit]
                 rough = 0.10 * gauss(key, counter + 1) if kind == _HEDGE else 0.0
-                cls = 6.0 if kind in (_BUILDING, _FURNITURE) else 3.0 if kind == _HEDGE else 1.0
+                cls = 6.0 if kind in (_BUILDING, _ROOF_STRUCTURE) else 3.0 if kind == _HEDGE else 1.0
                 nir = standing.roof_nir[hit] if face >= 4 else standing.wall_nir[hit]
                 _put(echo, echoes, max(height + rough, 0.0), nir, cls)
                 echoes += 1

@@ -16,7 +16,7 @@ toronto-a, -b           Yu et al. 2013, section 3: 1.45 km2 in all, 130 and 153 
                         points. Our choice: the area is split in proportion to the points; an RGB image of 0.25 m,
                         because the other detectors need one
 vaihingen-a, -b         2013: 263 and 290 entities, 3 775 182 and 3 582 656 points. Our choice: 750 x 750 m and
-                        731 x 731 m, which is 6.7 points per m2 as the ISPRS benchmark tells of that flight; an RGBI
+                        731 x 731 m, which is 6.7 points per m2 as the ISPRS benchmark states for that flight; an RGBI
                         image of 0.25 m
 ======================  =====================================================================================
 

@@ -110,7 +110,7 @@ class SceneParameters(Parameterised):
     )
     tree_height: float = parameter(7.0, unit="m", minimum=2, maximum=40, doc="median")
     tree_clumping: float = parameter(0.3, minimum=0, maximum=1, doc="share of trees that stand in clumps")
-    woodland: float = parameter(0.0, minimum=0, maximum=1, doc="how far trees crowd where nobody builds")
+    woodland: float = parameter(0.0, minimum=0, maximum=1, doc="share of trees in woods beside the parcels")
     conifers: float = parameter(0.1, minimum=0, maximum=1, doc="share of the trees")
     autumn_share: float = parameter(0.05, minimum=0, maximum=1, doc="share of trees that are not green")
     dryness: float = parameter(0.4, minimum=0, maximum=1, doc="share of the grass that is dry")

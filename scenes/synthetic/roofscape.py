@@ -39,7 +39,7 @@ class Numbers(Protocol):
 def _on(host: Solid, along: float, across: float, length: float, width: float, lift: float, **more: object) -> Solid:
     """Return a solid on a host's roof; `along`, `across` from its centre; `lift` above the roof there, metres."""
     cosine, sine = math.cos(host.angle), math.sin(host.angle)
-    values: dict[str, object] = {"colour": _STEEL, "wall": _STEEL, "body": Body.FURNITURE, **more}
+    values: dict[str, object] = {"colour": _STEEL, "wall": _STEEL, "body": Body.ROOF_STRUCTURE, **more}
     return Solid(
         host.x + cosine * along - sine * across,
         host.y + sine * along + cosine * across,
@@ -64,7 +64,7 @@ def roof_height(host: Solid, along: float, across: float) -> float:
 
 
 def furnish(group: list[Solid], zone: int, draws: Numbers) -> list[Solid]:
-    """Return the furniture of a building's roofs."""
+    """Return the structures on the roofs of a building: chimneys, dormers, plant."""
     host = group[0]
     if zone == TOWERS:
         return [item for part in group for item in _plant(part, draws)]
@@ -94,7 +94,7 @@ def _domestic(host: Solid, draws: Numbers) -> list[Solid]:
                     roof_height(host, -along, side * host.width * 0.34) + 0.7,
                     roof=Roof.GABLE,
                     pitch=0.5,
-                    body=Body.FURNITURE,
+                    body=Body.ROOF_STRUCTURE,
                     colour=host.colour,
                     wall=host.wall,
                     texture=host.texture,
@@ -123,7 +123,7 @@ def _panels(host: Solid, side: float, draws: Numbers) -> list[Solid]:
             rise + 0.12,
             roof=Roof.SHED,
             pitch=host.pitch,
-            body=Body.FURNITURE,
+            body=Body.ROOF_STRUCTURE,
             colour=_PANEL,
             wall=_PANEL,
         )

@@ -8,7 +8,7 @@ solid
 roof kind
     flat; shed (one plane, rising across the width); gable (ridge along the length); hip (four planes).
 body kind
-    What a solid is: building, furniture (on a roof), car, hedge, fence, carport.
+    What a solid is: building, roof structure, car, hedge, fence, carport.
 
 Angles are radians from east towards north; lengths metres; colours red, green, blue, near infrared in 0..1.
 """
@@ -30,7 +30,7 @@ class Body(enum.IntEnum):
     """What a solid is."""
 
     BUILDING = 0
-    FURNITURE = 1
+    ROOF_STRUCTURE = 1
     CAR = 2
     HEDGE = 3
     FENCE = 4

@@ -25,7 +25,7 @@ from ...core.kernels import kernel
 
 __all__ = ["PARTS", "Draws", "counter_key", "fractal_field", "fractal_tile", "gauss", "stream", "uniform"]
 
-#: Numbers of the parts; a part keeps its number for ever, new ones are added at the end.
+#: Numbers of the parts; a number never changes; new parts are added at the end.
 PARTS = {
     name: number
     for number, name in enumerate(

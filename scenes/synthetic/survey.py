@@ -1,7 +1,7 @@
 """The DEM that is handed out: what an airborne survey makes of the bare earth.
 
 A ground filter leaves points on open ground only. Below buildings, cars and hedges there are none, below crowns few;
-the DEM is interpolated over those gaps and smoothed over the spacing of the points left. So it knows the pad that a
+the DEM is interpolated over those gaps and smoothed over the spacing of the points left. So it includes the pad that a
 house on a slope stands on only by its rim, and blurs the edges of terraces and retaining walls, while the error on open
 ground is small.
 

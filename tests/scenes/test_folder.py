@@ -106,7 +106,7 @@ def test_a_file_edited_later_is_noticed_and_can_be_sealed(saved, tmp_path):
     )
     with pytest.raises(InputError, match=r"reference\.gpkg changed since .*--update-checksums"):
         _ = rb.open_scene(edited).content_hash
-    assert folder.seal_scene(edited) == ["reference.gpkg"]
+    assert folder.update_checksums(edited) == ["reference.gpkg"]
     assert folder.changed_files(edited) == []
     assert rb.open_scene(edited).content_hash != rb.open_scene(saved).content_hash
 
