@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, ParameterError, RoofbenchError, UnknownNameError
+from ..core.inputs import require_file
 from ..core.registry import nearest_hint, parse_selection
 from ..detectors.base import Detector
 from ..detectors.registry import DETECTORS, make_detector
@@ -128,10 +129,9 @@ def read_suite(path: str | Path) -> Suite:
         Missing file, TOML syntax, unknown keys or values; the line is named.
     """
     file = Path(path)
+    require_file(file, "a suite, a TOML file")
     try:
         text = file.read_text("utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{file}: no such suite file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{file} cannot be read as a suite: {error}") from error
     return _parse(text, source=str(file), folder=file.resolve().parent, default_name=file.stem)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -181,11 +182,11 @@ def _check_targets(
     from ..core.output import check_target
     from ..scenes.geodata.vector_files import output_driver, split_layer
 
-    read = {split_layer(name)[0].resolve() for name in inputs if name}
+    read = {os.path.realpath(split_layer(name)[0]) for name in inputs if name}
     for target in (verdicts, plot):
         if target is not None:
             check_target(target, overwrite)
-            if target.resolve() in read:
+            if os.path.realpath(target) in read:
                 raise OutputError(f"{target} is an input of this comparison: name another file")
     if verdicts is not None:
         output_driver(verdicts)

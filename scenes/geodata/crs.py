@@ -75,6 +75,18 @@ def _horizontal(text: str) -> CRS:
     return crs
 
 
+@lru_cache(maxsize=64)
+def _usable(text: str) -> bool:
+    """Return whether PROJ can compute with a system; a family such as "UTM, north" cannot."""
+    import pyproj
+
+    try:
+        pyproj.Proj(_horizontal(text))
+    except pyproj.exceptions.ProjError:
+        return False
+    return True
+
+
 #: How files of other kinds than points get another CRS.
 _REPROJECT = "reproject it, for instance with ogr2ogr -t_srs or gdalwarp -t_srs"
 
@@ -102,6 +114,11 @@ def require_metric(text: str | None, where: str, *, heights: bool = True, remedy
         raise CRSError(
             f"{where}: {crs_label(text)} is geographic (degrees), areas and distances need metres: "
             f"{remedy or _REPROJECT + ', or set its true CRS by crs='}"
+        )
+    if not crs.is_projected or not _usable(text):
+        raise CRSError(
+            f"{where}: {crs_label(text)} ({crs.name}) is not a projected system with coordinates in metres: "
+            f"{remedy or 'set its true CRS by crs='}"
         )
     unit = crs.axis_info[0] if crs.axis_info else None
     if unit is not None and abs(unit.unit_conversion_factor - 1.0) > 1e-9:

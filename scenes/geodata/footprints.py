@@ -33,6 +33,8 @@ __all__ = ["Footprints", "Repair", "polygonal_part"]
 
 #: Widest gap that is closed between footprints, metres: no two houses so far apart are one block.
 _WIDEST_GAP = 100.0
+#: Coordinates of no system on earth, metres; squares of such numbers are not finite.
+_FARTHEST = 1e9
 
 #: Stands for "number the rows from 0".
 _UNNUMBERED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
@@ -317,10 +319,12 @@ def _mend(
     for row in np.flatnonzero(kept & ~polygonal):
         repairs.append(Repair(int(row), f"not a polygon: {geometries[row].geom_type}", "left out"))
     kept &= polygonal
-    finite = np.isfinite(shapely.bounds(geometries)).all(axis=1)
+    bounds = shapely.bounds(geometries)
+    finite = np.isfinite(bounds).all(axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         finite[kept] &= np.isfinite(shapely.area(geometries[kept]))
     leave_out(~finite, "coordinates that are not finite")
+    leave_out(finite & (np.abs(bounds) > _FARTHEST).any(axis=1), f"coordinates beyond {_FARTHEST:g} m")
 
     suspect = np.flatnonzero(kept)[~shapely.is_valid(geometries[kept])]
     suspect = np.union1d(suspect, np.flatnonzero(kept & (shapely.get_type_id(geometries) == 7)))

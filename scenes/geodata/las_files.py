@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError, OutputError
+from ...core.inputs import require_file
 from .crs import crs_text, parse_crs, require_metric
 from .points import PointCloud
 
@@ -263,10 +264,7 @@ def _opened(file: Path) -> Iterator[Any]:
     from laspy.errors import LaspyException
     from lazrs import LazrsError
 
-    if not file.exists():
-        raise InputError(f"{file}: no such file")
-    if not file.is_file():
-        raise InputError(f"{file} is a folder: name LAS, LAZ or COPC files, for instance {file}/*.laz")
+    require_file(file, f"LAS, LAZ or COPC files, for instance {file}/*.laz")
     with file.open("rb") as stream:
         head = stream.read(_HEADER_BYTES)
     if head[:4] != b"LASF":

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError
+from ...core.inputs import require_file
 from .crs import crs_text
 from .raster import Elevation, Grid, Image
 
@@ -273,8 +274,7 @@ def opened(file: Path, *, opaque: bool = False) -> Iterator[Any]:
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
-    if not file.exists():
-        raise InputError(f"{file}: no such file")
+    require_file(file, "a raster, for instance a GeoTIFF")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)  # reported as an error by read_raster_header

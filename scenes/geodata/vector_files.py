@@ -19,6 +19,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError, OutputError
+from ...core.inputs import require_file
 from ...core.output import whole_file
 from ...core.registry import nearest_hint
 from .crs import common_crs, crs_label, crs_text, named_crs, parse_crs, require_metric, same_crs
@@ -97,8 +98,6 @@ def read_footprints(
     """
     file, named = split_layer(path)
     layer = layer or named
-    if not file.exists():
-        raise InputError(f"{file}: no such file")
     if crs is not None:
         crs = named_crs(crs)
     closed: list[Repair] = []
@@ -219,8 +218,8 @@ def _read_ogr(
     import pyogrio.raw
     from pyogrio.errors import DataLayerError, DataSourceError
 
-    if file.is_dir() and file.suffix.lower() != ".gdb":
-        raise InputError(f"{file} is a folder: name a vector file, for instance .gpkg or .geojson")
+    if not (file.is_dir() and file.suffix.lower() == ".gdb"):
+        require_file(file, "a vector file, for instance .gpkg or .geojson")
     try:
         listed = pyogrio.list_layers(file)
         names = [str(name) for name, kind in listed if kind is not None] or [str(name) for name in listed[:, 0]]
@@ -268,6 +267,7 @@ def _quiet() -> Iterator[None]:
 
 
 def _read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None]:
+    require_file(file, "a vector file, for instance .gpkg or .geojson")
     geopandas = _parquet_support(file, InputError)
     try:
         frame = geopandas.read_parquet(file)

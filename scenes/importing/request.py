@@ -147,11 +147,12 @@ class ImportRequest:
 
 def _paths(value: _Paths) -> tuple[Path, ...]:
     paths = (Path(value),) if isinstance(value, str | os.PathLike) else tuple(map(Path, value))
-    seen: set[Path] = set()
+    seen: set[str] = set()
     for path in paths:
-        if path.resolve() in seen:
+        place = os.path.realpath(path)
+        if place in seen:
             raise ParameterError(f"{path} is given twice: its points or pixels would count double")
-        seen.add(path.resolve())
+        seen.add(place)
     return paths
 
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+from hostile.samples import make_files
 from hostile.sandbox import Sandbox
 
 
@@ -10,3 +11,10 @@ def sandbox():
     made = Sandbox()
     yield made
     made.close()
+
+
+@pytest.fixture(scope="session")
+def sound_files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sound")
+    make_files(folder)
+    return folder
