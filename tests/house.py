@@ -6,15 +6,13 @@ itself (``scenes/folder.py``). A *floor* is the level of a room, or of a unit in
 floors to lower ones. Everything is read from the syntax trees of the files. Nothing is imported, and imports under
 ``TYPE_CHECKING`` or inside functions count like all others.
 
-``python -m tests.house`` prints the picture of the imports and how often each rule is broken; ``--shrink`` removes the
-known exceptions that no longer occur.
+``python -m tests.house`` prints the picture of the imports and how often each rule is broken.
 """
 
 from __future__ import annotations
 
 import ast
 import re
-import sys
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -38,9 +36,6 @@ UNITS = {
 
 MOST_LINES = 450
 MOST_ARGUMENTS = 8
-
-#: Known exceptions, one file for each (sub-)room; they only become fewer.
-EXCEPTIONS = Path(__file__).parent / "house_exceptions"
 
 #: The only module that may import numba's compilers.
 KERNELS = "core/kernels.py"
@@ -370,28 +365,5 @@ def _units_of(house: House, room: str, level: int, arrows: Counter[tuple[str, st
         yield f"           {level}  {unit} -> {', '.join(below) or 'nothing of its room'}"
 
 
-def exceptions() -> dict[str, set[str]]:
-    """Return the known exceptions of each rule, from one file for each (sub-)room: lines ``rule: subject``."""
-    known: dict[str, set[str]] = {rule.__name__: set() for rule in RULES}
-    for path in sorted(EXCEPTIONS.glob("*.txt")):
-        for line in path.read_text(encoding="utf-8").splitlines():
-            rule, _, subject = line.partition(": ")
-            known[rule].add(subject)
-    return known
-
-
-def drop_mended_exceptions(house: House) -> None:
-    """Remove the known exceptions that no longer occur; none is ever added."""
-    broken = {f"{rule.__name__}: {subject}" for rule in RULES for subject in rule(house)}
-    for path in EXCEPTIONS.glob("*.txt"):
-        kept = [line for line in path.read_text(encoding="utf-8").splitlines() if line in broken]
-        if kept:
-            path.write_text("\n".join(kept) + "\n", encoding="utf-8")
-        else:
-            path.unlink()
-
-
 if __name__ == "__main__":
-    if "--shrink" in sys.argv:
-        drop_mended_exceptions(House())
     print(picture(House()))

@@ -16,15 +16,8 @@ HOUSE = house.House()
 
 @pytest.mark.parametrize("rule", house.RULES, ids=lambda rule: rule.__name__)
 def test_the_layout_is_kept(rule):
-    broken, known = rule(HOUSE), house.exceptions()[rule.__name__]
-    assert not broken - known, f"{rule.__doc__} Broken by: {sorted(broken - known)}"
-    assert not known - broken, "these exceptions no longer occur; remove them with 'python -m tests.house --shrink'"
-
-
-def test_the_packages_are_those_of_the_tree():
-    listed = set(PROJECT["tool"]["setuptools"]["packages"])
-    found = {".".join(("roofbench", *module.package)) for module in HOUSE.modules.values()}
-    assert listed == found
+    broken = rule(HOUSE)
+    assert not broken, f"{rule.__doc__} Broken by: {sorted(broken)}"
 
 
 PLANTED = {

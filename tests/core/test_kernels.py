@@ -115,7 +115,7 @@ def test_a_changed_overlap_area_changes_the_result_of_a_run(tmp_path):
     code = AREAS.format("overlap.py:Overlap")
     paths = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
     assert python(code, tmp_path, cache, PYTHONPATH=paths)[0] == ["8.0"]
-    end = "    return 0.5 * abs(area)"
+    end = "    return float(0.5 * abs(area))"
     edit(copy / "detectors" / "mpp" / "rectangles.py", end, end.replace("0.5", "0.75"))
     assert python(code, tmp_path, cache, PYTHONPATH=paths)[0] == ["12.0"]
 
