@@ -5,7 +5,8 @@ death (step 4). A proposal is accepted when its ratio reaches the constant false
 number (equation 7). The state with the highest posterior is the result (equation 17).
 
 What the paper leaves open is read as follows: the five transformations of figure 2 are drawn equally often, nu and tau
-are drawn with each of them; an edge-based change moves one of the two ends, drawn equally often.
+are drawn with each of them; an edge-based change moves one of the two ends, drawn equally often. A least nu, truncated
+priors and a largest overlap are no part of the print: they are off unless they are set.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from .arrays import Floats, RandomState
 from .printed_model import (
     ANGLE,
     GROUND,
@@ -36,11 +37,10 @@ from .printed_model import (
     update_log_ratio,
 )
 from .random_stream import gaussian, integer, uniform
+from .rectangles import overlap_area
 from .reshaping import move_edge
 
 __all__ = ["Operation", "PrintedSchedule", "PrintedTrace", "run_printed"]
-
-_Floats = NDArray[np.float64]
 
 #: Metres: least standard deviation of a roof that is proposed.
 _LEAST_TAU = 0.05
@@ -93,6 +93,12 @@ class PrintedSchedule(NamedTuple):
         p_f of equation 7.
     birth_share : float
         b_k: share of births among births and deaths.
+    least_nu : float
+        Metres: a lower nu is not accepted.
+    prior_limit : float
+        Marks further than this many standard deviations from the mean of their prior are not accepted.
+    overlap_share : float
+        Share of its area that a building may have in common with another; 1 allows everything.
     buildings : float
         Mean of the Poisson distribution of the number of buildings (lambda).
     capacity : int
@@ -101,11 +107,14 @@ class PrintedSchedule(NamedTuple):
         Iterations per row of the trace.
     """
 
-    steps: _Floats
-    sides: _Floats
+    steps: Floats
+    sides: Floats
     iterations: int
     false_alarm_ratio: float
     birth_share: float
+    least_nu: float
+    prior_limit: float
+    overlap_share: float
     buildings: float
     capacity: int
     stride: int
@@ -113,12 +122,12 @@ class PrintedSchedule(NamedTuple):
 
 @kernel
 def _draw_building(
-    new: _Floats,
-    buildings: _Floats,
+    new: Floats,
+    buildings: Floats,
     shape: tuple[int, int],
     model: PrintedModel,
     schedule: PrintedSchedule,
-    state: NDArray[np.uint64],
+    state: RandomState,
 ) -> bool:
     """Fill a new building, its centre uniform outside all others, its marks from the priors; return whether it fits."""
     new[ANGLE] = uniform(state) * math.pi
@@ -141,7 +150,7 @@ def _draw_building(
 
 
 @kernel
-def _draw_marks(new: _Floats, schedule: PrintedSchedule, state: NDArray[np.uint64]) -> None:
+def _draw_marks(new: Floats, schedule: PrintedSchedule, state: RandomState) -> None:
     """Change the marks of a building, in place: one of the five transformations, and nu and tau."""
     steps, sides = schedule.steps, schedule.sides
     new[NU] += steps[3] * gaussian(state)
@@ -162,7 +171,7 @@ def _draw_marks(new: _Floats, schedule: PrintedSchedule, state: NDArray[np.uint6
 
 
 @kernel
-def _centre_accepted(new: _Floats, old: _Floats, table: _Floats, model: PrintedModel, limit: float) -> bool:
+def _centre_accepted(new: Floats, old: Floats, table: Floats, model: PrintedModel, limit: float) -> bool:
     """Return whether equations 8 and 10, or 9 and 11, reach the limit."""
     for released in (GROUND, TREE):
         least = centre_log_ratio(new, old, released, GROUND, table, model)
@@ -173,9 +182,34 @@ def _centre_accepted(new: _Floats, old: _Floats, table: _Floats, model: PrintedM
 
 
 @kernel
+def _permitted(
+    new: Floats,
+    buildings: Floats,
+    skip: int,
+    shape: tuple[int, int],
+    model: PrintedModel,
+    schedule: PrintedSchedule,
+) -> bool:
+    """Return whether a building lies on the grid, its marks are in their ranges and it overlaps none too much."""
+    if not (0.0 <= new[X] < shape[1] and 0.0 <= new[Y] < shape[0] and new[NU] >= schedule.least_nu):
+        return False
+    for k, column in enumerate((LENGTH, WIDTH, NU, TAU)):
+        if abs(new[column] - model.prior[k, 0]) > schedule.prior_limit * model.prior[k, 1]:
+            return False
+    if schedule.overlap_share >= 1.0:
+        return True
+    for i in range(len(buildings)):
+        if i != skip:
+            smaller = min(new[LENGTH] * new[WIDTH], buildings[i, LENGTH] * buildings[i, WIDTH])
+            if overlap_area(new, buildings[i]) > schedule.overlap_share * smaller:
+                return False
+    return True
+
+
+@kernel
 def run_printed(
-    table: _Floats, model: PrintedModel, schedule: PrintedSchedule, state: NDArray[np.uint64]
-) -> tuple[_Floats, _Floats]:
+    table: Floats, model: PrintedModel, schedule: PrintedSchedule, state: RandomState
+) -> tuple[Floats, Floats]:
     """Run the printed simulation.
 
     Parameters
@@ -224,7 +258,7 @@ def run_printed(
                 new[Y] += along * sin + across * cos
                 accepted = _centre_accepted(new, buildings[i], table, model, limit)
             trace[row, PrintedTrace.TRIED + operation] += 1
-            if accepted and 0.0 <= new[X] < shape[1] and 0.0 <= new[Y] < shape[0]:
+            if accepted and _permitted(new, buildings[:count], i, shape, model, schedule):
                 trace[row, PrintedTrace.ACCEPTED + operation] += 1
                 gain = log_posterior_gain(new, table, model)
                 total += gain - gains[i]
@@ -233,7 +267,7 @@ def run_printed(
             trace[row, PrintedTrace.TRIED + Operation.BIRTH] += 1
             if count < schedule.capacity and _draw_building(new, buildings[:count], shape, model, schedule, state):
                 ratio = min(birth_log_ratio(new, GROUND, table, model), birth_log_ratio(new, TREE, table, model))
-                if ratio >= limit:
+                if ratio >= limit and _permitted(new, buildings[:count], -1, shape, model, schedule):
                     trace[row, PrintedTrace.ACCEPTED + Operation.BIRTH] += 1
                     buildings[count], gains[count] = new, log_posterior_gain(new, table, model)
                     total += gains[count]

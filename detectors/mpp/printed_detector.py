@@ -130,6 +130,25 @@ class MPPPrinted(Detector):
         doc="likelihoods of equation 6: of both windows by themselves, or over their union as in equations 8 to 11",
         source="Yu et al. 2013, equation 6",
     )
+    least_height: float | None = parameter(
+        None,
+        unit="m",
+        doc="least nu above the mean of the ground; none: no limit, as printed",
+        source="roofbench, a reading of the prior of nu",
+    )
+    prior_limit: float | None = parameter(
+        None,
+        minimum=0.1,
+        doc="marks further than this many standard deviations from their prior's mean are refused; none: as printed",
+        source="roofbench, a reading of the Gaussian priors of equation 5",
+    )
+    overlap_share: float = parameter(
+        1.0,
+        minimum=0,
+        maximum=1,
+        doc="share of its area that a building may have in common with another; 1: overlap is free, as printed",
+        source="roofbench, a reading of the partition of D in section 2.1",
+    )
     length_step: float = parameter(
         1.0, unit="m", minimum=1e-3, doc="standard deviation of proposals of the length", source=_EPSILON
     )
@@ -189,7 +208,7 @@ class MPPPrinted(Detector):
         best, trace = run_printed(
             sum_table(index, z - base, grid.shape),
             self._model(gaussians, base, grid.gsd),
-            self._schedule(grid.gsd),
+            self._schedule(grid.gsd, gaussians["ground"][0] - base),
             stream([seed]),
         )
         record: dict[str, Any] = {
@@ -232,7 +251,7 @@ class MPPPrinted(Detector):
     def _birth_share(self) -> float:
         return 1.0 / (1.0 + self.buildings) if self.birth_share is None else self.birth_share
 
-    def _schedule(self, cell: float) -> PrintedSchedule:
+    def _schedule(self, cell: float, ground: float) -> PrintedSchedule:
         return PrintedSchedule(
             np.array(
                 [
@@ -247,6 +266,9 @@ class MPPPrinted(Detector):
             self.iterations,
             self.false_alarm_ratio,
             self._birth_share,
+            -math.inf if self.least_height is None else ground + self.least_height,
+            math.inf if self.prior_limit is None else self.prior_limit,
+            self.overlap_share,
             self.buildings,
             _CAPACITY,
             max(self.iterations // _ROWS, 1),

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from .arrays import Floats
 from .rectangles import row_span
 
 __all__ = [
@@ -51,8 +52,6 @@ __all__ = [
     "update_log_ratio",
 ]
 
-_Floats = NDArray[np.float64]
-
 #: Rows of `PrintedModel.classes`.
 GROUND, TREE = 0, 1
 #: Columns of a building.
@@ -76,14 +75,14 @@ class PrintedModel(NamedTuple):
         Whether equation 6 compares both states over the union of both windows, as equations 8 to 11 do.
     """
 
-    classes: _Floats
-    prior: _Floats
+    classes: Floats
+    prior: Floats
     match: float
     log_birth: float
     union: bool
 
 
-def sum_table(index: NDArray[np.intp], z: _Floats, shape: tuple[int, int]) -> _Floats:
+def sum_table(index: NDArray[np.intp], z: Floats, shape: tuple[int, int]) -> Floats:
     """Return the sum table of points.
 
     Parameters
@@ -102,7 +101,7 @@ def sum_table(index: NDArray[np.intp], z: _Floats, shape: tuple[int, int]) -> _F
 
 
 @kernel
-def _span(building: _Floats, row: int, columns: int) -> tuple[int, int]:
+def _span(building: Floats, row: int, columns: int) -> tuple[int, int]:
     """Return the cells first..last of a row whose centre lies in a building."""
     cos, sin = math.cos(building[ANGLE]), math.sin(building[ANGLE])
     low, high = row_span(row + 0.5 - building[Y], 0.5 * building[LENGTH], 0.5 * building[WIDTH], cos, sin)
@@ -113,14 +112,14 @@ def _span(building: _Floats, row: int, columns: int) -> tuple[int, int]:
 
 
 @kernel
-def _rows(building: _Floats, rows: int) -> tuple[int, int]:
+def _rows(building: Floats, rows: int) -> tuple[int, int]:
     """Return the rows that a building reaches."""
     tall = 0.5 * (building[LENGTH] * abs(math.sin(building[ANGLE])) + building[WIDTH] * abs(math.cos(building[ANGLE])))
     return max(math.floor(building[Y] - tall), 0), min(math.ceil(building[Y] + tall), rows)
 
 
 @kernel
-def building_sums(building: _Floats, table: _Floats, sums: _Floats) -> None:
+def building_sums(building: Floats, table: Floats, sums: Floats) -> None:
     """Fill the sums of the points in a building."""
     sums[:] = 0.0
     top, bottom = _rows(building, table.shape[0])
@@ -131,7 +130,7 @@ def building_sums(building: _Floats, table: _Floats, sums: _Floats) -> None:
 
 
 @kernel
-def common_sums(one: _Floats, other: _Floats, table: _Floats, sums: _Floats) -> None:
+def common_sums(one: Floats, other: Floats, table: Floats, sums: Floats) -> None:
     """Fill the sums of the points in both of two buildings."""
     sums[:] = 0.0
     top, bottom = _rows(one, table.shape[0])
@@ -145,14 +144,14 @@ def common_sums(one: _Floats, other: _Floats, table: _Floats, sums: _Floats) -> 
 
 
 @kernel
-def log_likelihood(sums: _Floats, mean: float, spread: float) -> float:
+def log_likelihood(sums: Floats, mean: float, spread: float) -> float:
     """Return the log-likelihood of points under one Gaussian (equation 2)."""
     squares = sums[2] - 2.0 * mean * sums[1] + mean * mean * sums[0]
     return float(-sums[0] * math.log(math.sqrt(2.0 * math.pi) * spread) - 0.5 * squares / (spread * spread))
 
 
 @kernel
-def matching_share(sums: _Floats, nu: float, tau: float, match: float) -> float:
+def matching_share(sums: Floats, nu: float, tau: float, match: float) -> float:
     """Return n / N of equation 6: the share of points within `match` tau of nu, as of a Gaussian with these sums."""
     if sums[0] < 0.5:
         return 0.0
@@ -163,7 +162,7 @@ def matching_share(sums: _Floats, nu: float, tau: float, match: float) -> float:
 
 
 @kernel
-def log_prior(building: _Floats, prior: _Floats) -> float:
+def log_prior(building: Floats, prior: Floats) -> float:
     """Return the logarithm of equation 5 for one building; place and angle are uniform, and constants left out."""
     total = 0.0
     for k, column in enumerate((LENGTH, WIDTH, NU, TAU)):
@@ -172,7 +171,7 @@ def log_prior(building: _Floats, prior: _Floats) -> float:
 
 
 @kernel
-def _marks_log_ratio(new: _Floats, old: _Floats, after: _Floats, before: _Floats, model: PrintedModel) -> float:
+def _marks_log_ratio(new: Floats, old: Floats, after: Floats, before: Floats, model: PrintedModel) -> float:
     """Return the logarithm of P(B*) exp(n*/N*) / (P(B) exp(n/N)), which equations 6 and 8 to 11 share."""
     ratio = log_prior(new, model.prior) - log_prior(old, model.prior)
     ratio += matching_share(after, new[NU], new[TAU], model.match)
@@ -180,7 +179,7 @@ def _marks_log_ratio(new: _Floats, old: _Floats, after: _Floats, before: _Floats
 
 
 @kernel
-def update_log_ratio(new: _Floats, old: _Floats, table: _Floats, model: PrintedModel) -> float:
+def update_log_ratio(new: Floats, old: Floats, table: Floats, model: PrintedModel) -> float:
     """Return the logarithm of equation 6; minus infinity where the new window holds no point.
 
     As printed it compares the likelihoods of two different point sets. With `PrintedModel.union` points that only one
@@ -199,16 +198,14 @@ def update_log_ratio(new: _Floats, old: _Floats, table: _Floats, model: PrintedM
 
 
 @kernel
-def _best_class(sums: _Floats, classes: _Floats) -> float:
+def _best_class(sums: Floats, classes: Floats) -> float:
     """Return the log-likelihood of points under the class that explains them better."""
     ground = log_likelihood(sums, classes[GROUND, 0], classes[GROUND, 1])
     return float(max(ground, log_likelihood(sums, classes[TREE, 0], classes[TREE, 1])))
 
 
 @kernel
-def centre_log_ratio(
-    new: _Floats, old: _Floats, released: int, taken: int, table: _Floats, model: PrintedModel
-) -> float:
+def centre_log_ratio(new: Floats, old: Floats, released: int, taken: int, table: Floats, model: PrintedModel) -> float:
     """Return the logarithm of one of equations 8 to 11; minus infinity where the new window holds no point.
 
     Parameters
@@ -235,7 +232,7 @@ def centre_log_ratio(
 
 
 @kernel
-def birth_log_ratio(building: _Floats, other: int, table: _Floats, model: PrintedModel) -> float:
+def birth_log_ratio(building: Floats, other: int, table: Floats, model: PrintedModel) -> float:
     """Return the logarithm of equation 14 (`other` ground) or 15 (tree), times the factor that equation 12 adds.
 
     Minus infinity where the window holds no point.
@@ -249,7 +246,7 @@ def birth_log_ratio(building: _Floats, other: int, table: _Floats, model: Printe
 
 
 @kernel
-def death_log_ratio(building: _Floats, table: _Floats, model: PrintedModel) -> float:
+def death_log_ratio(building: Floats, table: Floats, model: PrintedModel) -> float:
     """Return the logarithm of equation 16: the points of the building count as the class that explains them better."""
     sums = np.empty(3)
     building_sums(building, table, sums)
@@ -257,7 +254,7 @@ def death_log_ratio(building: _Floats, table: _Floats, model: PrintedModel) -> f
 
 
 @kernel
-def log_posterior_gain(building: _Floats, table: _Floats, model: PrintedModel) -> float:
+def log_posterior_gain(building: Floats, table: Floats, model: PrintedModel) -> float:
     """Return what a building adds to the log-posterior of equation 3, without the Poisson term of their number."""
     sums = np.empty(3)
     building_sums(building, table, sums)

@@ -2,6 +2,7 @@
 
 import json
 import math
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from roofbench.detectors.mpp.printed_chain import Operation, PrintedSchedule, Pr
 from roofbench.detectors.mpp.printed_detector import class_gaussians
 from roofbench.detectors.mpp.printed_model import (
     GROUND,
+    NU,
     TREE,
     PrintedModel,
     birth_log_ratio,
@@ -27,6 +29,7 @@ from roofbench.detectors.mpp.printed_model import (
     update_log_ratio,
 )
 from roofbench.detectors.mpp.random_stream import stream
+from roofbench.detectors.mpp.rectangles import overlap_area
 from roofbench.detectors.registry import make_detector
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid
@@ -166,6 +169,9 @@ def schedule(**changes):
         "iterations": 400,
         "false_alarm_ratio": 0.5,
         "birth_share": 0.5,
+        "least_nu": -math.inf,
+        "prior_limit": math.inf,
+        "overlap_share": 1.0,
         "buildings": 1.0,
         "capacity": 50,
         "stride": 1,
@@ -192,6 +198,25 @@ def test_the_best_state_has_the_highest_posterior_of_all_that_were_visited():
         value = sum(log_posterior_gain(building, table(), MODEL) for building in best)
         value += len(best) * math.log(3.0) - math.lgamma(len(best) + 1)
         assert -value == pytest.approx(trace[:, PrintedTrace.ENERGY].min(), abs=1e-6)
+
+
+def states(**changes):
+    """Buildings of the best states of some runs, and those that overlap in pairs."""
+    runs = [run_printed(table(), MODEL, schedule(**changes), stream([seed]))[0] for seed in range(8)]
+    pairs = [pair for best in runs for pair in combinations(best, 2) if overlap_area(*pair) > 0]
+    return np.concatenate(runs), pairs
+
+
+def test_what_is_no_part_of_the_print_is_off_unless_it_is_set():
+    marks = np.array([2, 3, 5, 6])
+    free, pairs = states()
+    assert (np.abs(free[:, marks] - PRIOR[:, 0]) > 1.5 * PRIOR[:, 1]).any()
+    assert free[:, NU].min() < 5.9
+    assert pairs
+    assert states(least_nu=5.9)[0][:, NU].min() >= 5.9
+    kept = states(prior_limit=1.5)[0]
+    assert (np.abs(kept[:, marks] - PRIOR[:, 0]) <= 1.5 * PRIOR[:, 1])[8:].all()
+    assert not states(overlap_share=0.0)[1]
 
 
 def test_lambda_decides_how_often_births_are_tried_unless_the_share_is_set():
