@@ -10,7 +10,7 @@ from typing import Any, Literal
 from ..core.errors import UnsupportedError
 from ..detectors.base import Detector
 from ..evaluators.base import Evaluator
-from ..scenes.scene import Scene
+from ..scenes.scene import INPUTS, Scene
 from .identity.keys import source_closure
 from .identity.recipes import PluginRecipe, SceneRecipe, code_digest, label_of
 from .store.records import RunIdentity, RunRow, evaluation_key
@@ -75,6 +75,8 @@ class PlannedRun:
         Reason as a sentence.
     stored : int, optional
         Run id where a run of that key is stored.
+    skip : str
+        Why the run will be skipped, as far as that is known without reading the scene; else empty.
     missing : tuple of KeyedEvaluator
         Evaluators whose evaluation is not stored.
     """
@@ -86,6 +88,7 @@ class PlannedRun:
     why: str
     stored: int | None = None
     missing: tuple[KeyedEvaluator, ...] = ()
+    skip: str = ""
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,11 @@ class Plan:
     def keys(self) -> list[str]:
         """Run keys in order."""
         return [run.identity.key for run in self.runs]
+
+    @property
+    def left_out(self) -> tuple[PlannedRun, ...]:
+        """The runs that are neither stored nor to be executed."""
+        return tuple(run for run in self.runs if run.stored is None and run.todo == "nothing")
 
     def counts(self) -> Mapping[str, int]:
         """Return how many runs are to be detected, evaluated, or kept as stored."""
@@ -129,7 +137,7 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
     store : Store
     rerun : {"missing", "never", "always"}
     only_failed : bool
-        Repeat failed runs and leave all others as they are.
+        Repeat failed runs and evaluate stored ones; runs that are not stored are left out.
     """
     evaluators = tuple(KeyedEvaluator.of(evaluator) for evaluator in suite.evaluators)
     identities: list[tuple[RunIdentity, DetectorEntry, SceneRecipe | Scene]] = []
@@ -180,12 +188,33 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
                 why += ", not yet evaluated by " + ", ".join(keyed.label for keyed in missing)
                 reasons = [failures[keyed.key][run_id] for keyed in missing if run_id in failures[keyed.key]]
                 why += f" (failed before: {'; '.join(reasons)})" if reasons else ""
-        if only_failed and status != "failed":
-            todo = "nothing"
+        if only_failed and status != "failed" and todo == "detect":
+            todo, why = "nothing", f"{why} (left out: only failed runs are repeated)"
+        skip = _foreseen_skip(scene, tuple(entry.detector.requires)) if todo == "detect" else ""
         runs.append(
-            PlannedRun(identity=identity, entry=entry, scene=scene, todo=todo, why=why, stored=run_id, missing=missing)
+            PlannedRun(
+                identity=identity,
+                entry=entry,
+                scene=scene,
+                todo=todo,
+                why=why,
+                stored=run_id,
+                missing=missing,
+                skip=skip,
+            )
         )
     return Plan(suite, tuple(runs), evaluators, rerun)
+
+
+def _foreseen_skip(scene: SceneRecipe | Scene, requires: tuple[str, ...]) -> str:
+    """Return which input a scene lacks, without reading or generating it; empty where that cannot be known."""
+    contents = scene.contents
+    if contents is None:
+        return ""
+    for need in requires:
+        if need not in contents and not (need in ("colour", "nir") and "image" in contents):
+            return f"scene {scene.name!r} has no {INPUTS[need]}"
+    return ""
 
 
 def _why_new(store: Store, identity: RunIdentity) -> str:

@@ -104,6 +104,11 @@ def run(
         console.print(
             f"{result.done} runs done, {known} stored before, {len(result.failed)} failed; store {options.store}"
         )
+        if plan.left_out:
+            console.print(
+                f"{len(plan.left_out)} runs of the suite are not stored and were left out: run without --retry-failed "
+                "to execute them"
+            )
         # Files before the table: who reads it may close the pipe (head).
         if output is not None:
             write_leaderboards(output, boards)
@@ -125,14 +130,24 @@ def run(
 
 def _print_plan(plan: Plan) -> None:
     words = {"detect": "run", "evaluate": "evaluate", "nothing": "stored"}
+    skipped = 0
     for run in plan.runs:
-        identity = run.identity
-        typer.echo(f"{words[run.todo]:9}{identity.label}  {identity.scene.name}  seed {identity.seed}: {run.why}")
-    counts = plan.counts()
-    typer.echo(
-        f"{len(plan.runs)} runs: {counts['detect']} to run, {counts['evaluate']} to evaluate, "
-        f"{counts['nothing']} left as stored"
-    )
+        identity, word, why = run.identity, words[run.todo], run.why
+        if run.skip:
+            word, why = "skip", f"{why}; {run.skip}"
+            skipped += 1
+        elif run.stored is None and run.todo == "nothing":
+            word = "left out"
+        typer.echo(f"{word:9}{identity.label}  {identity.scene.name}  seed {identity.seed}: {why}")
+    counts, left_out = plan.counts(), len(plan.left_out)
+    parts = [
+        f"{counts['detect'] - skipped} to run",
+        f"{counts['evaluate']} to evaluate",
+        f"{counts['nothing'] - left_out} left as stored",
+        *([f"{skipped} to skip"] if skipped else []),
+        *([f"{left_out} left out"] if left_out else []),
+    ]
+    typer.echo(f"{len(plan.runs)} runs: {', '.join(parts)}")
 
 
 def _make_folder(folder: Path, overwrite: bool) -> None:

@@ -22,7 +22,7 @@ from .geodata.raster import Elevation, Grid, Image
 if TYPE_CHECKING:
     from .ground.heights import Heights
 
-__all__ = ["Layers", "Scene"]
+__all__ = ["INPUTS", "Layers", "Scene"]
 
 #: What a detector may require, and how it is named to people.
 INPUTS: Mapping[str, str] = {

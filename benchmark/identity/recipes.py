@@ -154,6 +154,16 @@ class SceneRecipe:
         return self.place if self.kind == "folder" else self.name
 
     @property
+    def contents(self) -> tuple[str, ...] | None:
+        """The kinds of data of the scene (``points``, ``image``, ...) without reading them; None where not known."""
+        if self.kind == "folder":
+            return _open_folder(self.place).contents
+        if self.kind == "preset":
+            image = () if preset(self.place, **self.parameters).bands == "none" else ("image",)
+            return ("points", "dem", "reference", *image)
+        return None
+
+    @property
     def group(self) -> str:
         """The group of the scene: the preset with its parameters but without its seed, else the name."""
         if self.kind not in ("preset", "builtin"):

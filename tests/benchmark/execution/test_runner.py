@@ -1,6 +1,7 @@
 import re
 from dataclasses import dataclass, replace
 
+import numpy as np
 import pytest
 
 import roofbench as rb
@@ -34,8 +35,7 @@ def run(suite, path, *, jobs=0, rerun="missing", only_failed=False, **limits):
     with Store(path) as store:
         plan = make_plan(suite, store, rerun=rerun, only_failed=only_failed)
         result = run_plan(plan, store, execution=Execution(jobs=jobs, limits=Limits(**limits)))
-        judge = plan.evaluators[0]
-        return plan, result, store.index_values([row.id for row in result.ok], judge.key)
+        return plan, result, store.index_values([row.id for row in result.ok], plan.evaluators[0].key)
 
 
 def test_failures_are_rows_and_the_rest_completes(suite, tmp_path):
@@ -67,6 +67,27 @@ def test_retry_failed_leaves_new_runs_alone(suite, tmp_path):
         ("hamlet-2", "detect"),
         ("hamlet-2", "nothing"),
     }
+
+
+def test_retry_failed_evaluates_what_is_stored_and_names_what_it_leaves_out(suite, tmp_path):
+    run(replace(suite, scenes=suite.scenes[1:]), tmp_path / "a.sqlite")
+    corrected = replace(suite, evaluators=(make_evaluator("threshold-free[matching=overlap]"),))
+    plan, result, _ = run(corrected, tmp_path / "a.sqlite", only_failed=True)
+    assert {run.identity.scene.name for run in plan.left_out} == {"hamlet-1"}
+    assert all("left out" in run.why for run in plan.left_out)
+    good = {row.id for row in result.rows if row.status == "ok"}
+    assert result.evaluated == len(good) > 0
+
+
+def test_a_run_that_will_be_skipped_is_foreseen_without_reading_the_scene(tmp_path):
+    bare = rb.Scene("bare", (0, 0, 50, 50), points=rb.PointCloud(*np.zeros((3, 4))))
+    rb.save_scene(bare, tmp_path / "bare")
+    scenes = (bare, SceneRecipe.of_folder(tmp_path / "bare"), SceneRecipe.of_preset("hamlet", seed=1))
+    suite = Suite("s", scenes, (DetectorEntry(make_detector("original")),), (make_evaluator("threshold-free"),))
+    with Store(tmp_path / "a.sqlite") as store:
+        plan = make_plan(suite, store)
+    assert [run.skip for run in plan.runs[:-1]] == [bare.lacks(("colour",))] * (len(plan.runs) - 1)
+    assert plan.runs[-1].skip == ""
 
 
 def test_a_new_evaluator_reruns_no_detector(suite, tmp_path):
