@@ -92,3 +92,4 @@ def test_cleaning_the_default_folder_removes_the_layout_of_the_first_version(tmp
 
 def test_a_folder_that_is_not_there_is_clean(tmp_path):
     kernel_files.clean(tmp_path / "nowhere")
+    assert not list(tmp_path.iterdir())
