@@ -94,6 +94,17 @@ def _draw_line(
         at, low, high = zip(*spans, strict=True)
         panel.fill_between(at, low, high, color=colour, alpha=0.13, linewidth=0)
     panel.plot(x, y, color=colour, linestyle=dash, linewidth=1.5, marker=marker, markersize=4.5)
+    most = max((point.scenes for point in line.points), default=0)
+    for point, height in zip(known, y, strict=True):
+        if point.scenes < most:
+            panel.annotate(
+                f"n = {point.scenes}",
+                (places[point.value], height),
+                xytext=(4, 4),
+                textcoords="offset points",
+                fontsize=7,
+                color=INK,
+            )
     if line.default in places and any(point.value == line.default for point in known):
         here = next(point for point in known if point.value == line.default)
         panel.plot(
@@ -124,7 +135,9 @@ def _label_axis(
     counts = [point.scenes for line in lines for point in line.points]
     n = f"{min(counts)}" if min(counts) == max(counts) else f"{min(counts)}–{max(counts)}"
     title = name.removeprefix("scene.").replace("_", " ")
-    panel.set_xlabel(f"{shortened(title)}{f' [{unit}]' if unit else ''}; n = {n} scenes")
+    left_out = dict.fromkeys(parameter_text(value) for line in lines for value in line.left_out)
+    more = f"\nleft out (other scenes): {shortened(', '.join(left_out))}" if left_out else ""
+    panel.set_xlabel(f"{shortened(title)}{f' [{unit}]' if unit else ''}; n = {n} scenes{more}")
     kind = "scene" if name.startswith("scene.") else "detector parameter"
     panel.set_title(kind, loc="left", fontsize=10)
     if len(values) <= 7:

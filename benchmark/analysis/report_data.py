@@ -144,6 +144,8 @@ class Sensitivity:
         In the order of the axis.
     default : Any
         Default value of the detector; None for generator axes.
+    left_out : tuple
+        Values of the axis that are stored for other scenes only, and hence not on the line.
     break_down : BreakDown, optional
         Where the index passes a level; None when it was not looked for.
     """
@@ -154,6 +156,7 @@ class Sensitivity:
     index: Index
     points: tuple[SensitivityPoint, ...]
     default: Any = None
+    left_out: tuple[Any, ...] = ()
     break_down: BreakDown | None = None
 
 

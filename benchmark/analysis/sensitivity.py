@@ -1,5 +1,7 @@
 """Sensitivities: lines of a sweep, found among stored runs or read from the table that ``roofbench sweep`` writes.
 
+All points of a line are over the same scenes: values that lack some of them are left out of the line, and named.
+
 A stored run lies on an axis of the generator when its preset was changed in that one parameter, and on an axis of its
 detector when that one parameter differs from the default. Unchanged runs of the same scenes give the default's point.
 """
@@ -56,11 +58,20 @@ def stored_sensitivities(
     indices = keyed.evaluator.swept_indices(chosen)
     lines = []
     for axis, unit, default, label, by_value in itertools.chain(_scene_axes(rows), _detector_axes(rows)):
+        common, left_out = _over_common_scenes(by_value, by_seed=axis.startswith("scene."))
         for index in indices:
-            points = tuple(_point(value, own, values, index) for value, own in _in_order(by_value))
+            points = tuple(_point(value, own, values, index) for value, own in _in_order(common))
             if sum(point.mean is not None for point in points) < 2:
                 continue
-            line = Sensitivity(detector=label, axis=axis, unit=unit, index=index, points=points, default=default)
+            line = Sensitivity(
+                detector=label,
+                axis=axis,
+                unit=unit,
+                index=index,
+                points=points,
+                default=default,
+                left_out=left_out,
+            )
             lines.append(_with_break_down(line, level) if index is indices[0] else line)
     return lines[:_MOST_LINES]
 
@@ -177,6 +188,33 @@ def _detector_axes(rows: Sequence[RunRow]) -> Iterable[Axis]:
             if row.detector == detector and row.scene in scenes and row.parameters == plain[detector]
         ]
         yield name, unit, default, label, {**by_value, default: same}
+
+
+def _over_common_scenes(
+    by_value: Mapping[Any, list[RunRow]], *, by_seed: bool
+) -> tuple[dict[Any, list[RunRow]], tuple[Any, ...]]:
+    """Return the runs of one set of scenes by value, and the values that lack some of these scenes.
+
+    The set is the one that keeps most points, counted over values and scenes. Scenes that differ in the varied
+    parameter correspond by their seed.
+    """
+
+    def scene(row: RunRow) -> int | str:
+        return row.recipe.seed if by_seed else row.scene
+
+    sets = {value: frozenset(map(scene, rows)) for value, rows in by_value.items()}
+
+    def kept(chosen: frozenset[int | str]) -> tuple[bool, int]:
+        values = sum(chosen <= found for found in sets.values())
+        return values > 1, values * len(chosen)
+
+    chosen = max(sets.values(), key=kept)
+    common = {
+        value: [row for row in rows if scene(row) in chosen]
+        for value, rows in by_value.items()
+        if chosen <= sets[value]
+    }
+    return common, tuple(value for value in by_value if value not in common)
 
 
 def _facts_of(axis: str, owner: str) -> tuple[str, Any]:

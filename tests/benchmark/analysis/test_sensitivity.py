@@ -1,0 +1,93 @@
+"""Lines of stored sweeps: every point of a line is over the same scenes."""
+
+import json
+
+from roofbench.benchmark.analysis.sensitivity import stored_sensitivities
+from roofbench.benchmark.identity.recipes import SceneRecipe
+from roofbench.benchmark.plan import KeyedEvaluator
+from roofbench.benchmark.store.records import RunRow
+from roofbench.detectors.registry import make_detector
+from roofbench.evaluators.registry import make_evaluator
+from roofbench.reports.sensitivity import sensitivity_figure
+
+KEYED = KeyedEvaluator.of(make_evaluator("threshold-free"))
+DEFAULTS = make_detector("ndsm").values()
+
+
+class Stored:
+    """Rows of runs of ndsm, and their values of object quality."""
+
+    def __init__(self):
+        self.rows, self.values = [], {}
+
+    def add(self, quality, *, seed=1, scene=None, **parameters):
+        number = len(self.rows) + 1
+        recipe = SceneRecipe.of_preset("knox-small", seed=seed, parameters=scene or {})
+        changed = ",".join(f"{name}={value}" for name, value in parameters.items())
+        facts = dict.fromkeys(RunRow._fields, "") | {
+            "id": number,
+            "detector": "ndsm",
+            "label": f"ndsm[{changed}]" if changed else "ndsm",
+            "parameters_text": json.dumps({**DEFAULTS, **parameters}),
+            "seed": 0,
+            "scene": recipe.name,
+            "recipe_text": json.dumps(recipe.to_dict()),
+            "status": "ok",
+        }
+        self.rows.append(RunRow(**facts))
+        self.values[number] = {"object.quality": quality}
+
+    def line(self):
+        lines = stored_sensitivities(self.rows, self.values, KEYED, level=0.8, chosen=["object.quality"])
+        (line,) = lines
+        return line
+
+
+def points_of(line):
+    return [(point.value, round(point.mean, 6), point.scenes) for point in line.points]
+
+
+def test_a_single_run_at_another_value_is_not_joined_to_means_over_three_scenes():
+    stored = Stored()
+    for seed in (1, 2, 3):
+        for slope in (5, 10):
+            stored.add(0.9 - slope / 100 + seed / 100, seed=seed, scene={"slope": slope})
+    stored.add(0.1, seed=1, scene={"slope": 15.5})
+    line = stored.line()
+    assert points_of(line) == [(5, 0.87, 3), (10, 0.82, 3)]
+    assert line.left_out == (15.5,)
+    assert line.break_down.value is None
+    (panel,) = sensitivity_figure([line]).axes
+    assert "left out (other scenes): 15.5" in panel.get_xlabel()
+
+
+def test_further_scenes_at_one_value_do_not_enter_its_mean():
+    stored = Stored()
+    for seed in (1, 2):
+        for slope in (5, 10):
+            stored.add(0.5, seed=seed, scene={"slope": slope})
+    for seed in (3, 4, 5):
+        stored.add(1.0, seed=seed, scene={"slope": 10})
+    assert points_of(stored.line()) == [(5, 0.5, 2), (10, 0.5, 2)]
+
+
+def test_parameters_of_the_detector_are_compared_on_the_same_scenes():
+    stored = Stored()
+    for seed in (1, 2):
+        stored.add(0.6, seed=seed)
+        stored.add(0.4, seed=seed, height=4.0)
+    stored.add(1.0, seed=1, height=6.0)
+    line = stored.line()
+    assert points_of(line) == [(DEFAULTS["height"], 0.6, 2), (4.0, 0.4, 2)]
+    assert line.left_out == (6.0,)
+
+
+def test_a_point_with_fewer_defined_scenes_says_so_in_the_figure():
+    stored = Stored()
+    for seed in (1, 2):
+        stored.add(0.6, seed=seed, scene={"slope": 5})
+        stored.add(0.4 if seed == 1 else None, seed=seed, scene={"slope": 10})
+    line = stored.line()
+    assert points_of(line) == [(5, 0.6, 2), (10, 0.4, 1)]
+    (panel,) = sensitivity_figure([line]).axes
+    assert [text.get_text() for text in panel.texts] == ["n = 1"]
