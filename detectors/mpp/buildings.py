@@ -24,7 +24,7 @@ from ...scenes.geodata.outlines import trace
 from ...scenes.geodata.raster import Grid
 from .rectangles import corners, to_world
 
-__all__ = ["outline_buildings"]
+__all__ = ["block_of", "outline_buildings"]
 
 #: Common area over joint area from which the rectangle is as good an outline.
 _AS_GOOD = 0.95
@@ -36,7 +36,23 @@ _FINEST = 1e-6
 _SCRAP = 4.0
 
 
-def outline_buildings(rectangles: NDArray[np.float64], blocks: NDArray[np.object_], grid: Grid) -> NDArray[np.object_]:
+def block_of(outlines: NDArray[np.object_], blocks: NDArray[np.object_]) -> NDArray[np.int64]:
+    """Return the row of the block that holds most of each outline, shape (n,); -1 where none holds any of it."""
+    found = np.full(len(outlines), -1, dtype=np.int64)
+    if len(outlines) == 0 or len(blocks) == 0:
+        return found
+    one, block = shapely.STRtree(blocks).query(outlines, predicate="intersects")
+    common = shapely.area(shapely.intersection(outlines[one], blocks[block]))
+    order = np.lexsort((-common, one))
+    one, block = one[order], block[order]
+    first = np.unique(one, return_index=True)[1]
+    found[one[first]] = block[first]
+    return found
+
+
+def outline_buildings(
+    rectangles: NDArray[np.float64], blocks: NDArray[np.object_], grid: Grid, *, always: bool = False
+) -> NDArray[np.object_]:
     """Return one outline a rectangle, shape (n,), polygons or multipolygons in metres of the CRS.
 
     Parameters
@@ -46,27 +62,25 @@ def outline_buildings(rectangles: NDArray[np.float64], blocks: NDArray[np.object
     blocks : ndarray of shapely Polygons
         As `blocks.outline_blocks` returns them.
     grid : Grid
+    always : bool
+        Follow the cells even where the rectangle is as good an outline, so that the outlines cover their blocks.
     """
     outlines: NDArray[np.object_] = shapely.polygons(to_world(rectangles, grid))
     if len(rectangles) == 0 or len(blocks) == 0:
         return outlines
-    one, block = shapely.STRtree(blocks).query(outlines, predicate="intersects")
-    common = shapely.area(shapely.intersection(outlines[one], blocks[block]))
-    # Each rectangle belongs to the block that holds most of it.
-    order = np.lexsort((-common, one))
-    one, block = one[order], block[order]
-    first = np.unique(one, return_index=True)[1]
-    one, block = one[first], block[first]
+    block = block_of(outlines, blocks)
     tree = shapely.STRtree(outlines)
     result = outlines.copy()
-    alone = np.bincount(block, minlength=len(blocks)) == 1
-    for k, of in zip(one, block, strict=True):
+    alone = np.bincount(block[block >= 0], minlength=len(blocks)) == 1
+    for k in np.flatnonzero(block >= 0):
+        of = block[k]
         part = blocks[of]
         if not alone[of]:
             rivals = tree.query(outlines[k], predicate="dwithin", distance=2 * _REACH)
             part = _part(rectangles[k], rectangles[rivals[rivals != k]], part, grid)
         together = shapely.area(shapely.union(part, outlines[k]))
-        if not part.is_empty and shapely.area(shapely.intersection(part, outlines[k])) < _AS_GOOD * together:
+        good = 2.0 if always else _AS_GOOD
+        if not part.is_empty and shapely.area(shapely.intersection(part, outlines[k])) < good * together:
             result[k] = part
     # Zones are drawn one by one, and rectangles know of no zones: where two share a strip, the first keeps it.
     drawn = result != outlines

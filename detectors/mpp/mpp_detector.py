@@ -25,7 +25,7 @@ from .city import join_traces, sample_city, total_energy
 from .energy import rectangle_energies
 from .memory import release_memory
 from .mpp_steps import mpp_steps
-from .outcome import as_blocks, as_buildings, fit_roofs
+from .outcome import as_footprints, fit_roofs
 from .parameters import MPPParameters
 from .preparation import Prepared, prepare, weights_of
 from .scores import mean_evidence
@@ -40,6 +40,7 @@ _REMOVED = {
     "false_alarm_ratio": "it belongs to the detector 'mpp-printed'",
     "iterations": "it belongs to the detector 'mpp-printed'; the proposals of 'mpp' follow from effort",
     "workers": "set the execution option threads",
+    "outline": "choose the level part, building or block",
     **dict.fromkeys(
         ("furniture", "hot", "cold", "intensity", "jump_share", "split_share", "data_births"),
         "no value of it moved a result by more than another seed did, and it is a constant now: leave it out",
@@ -64,10 +65,7 @@ class MPP(MPPParameters, Detector):
         return super().build(values)
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
-        """Return buildings with the attributes height, tau, slope (m, m, m/m), roof and energy, and the run record.
-
-        Blocks (`outline`) have no attributes.
-        """
+        """Return footprints of the chosen `level`, with the attributes of `outcome.as_footprints`."""
         return self._run(scene, rng)[0]
 
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
@@ -119,17 +117,14 @@ class MPP(MPPParameters, Detector):
         # Outlines are made from the cells alone: the memory of the tables is released for them.
         prepared = replace(prepared, tables=NO_TABLES)
         release_memory()
-        if self.outline == "blocks":
-            found = as_blocks(prepared, rectangles, crs=scene.crs, record=record, source=self.name)
-        else:
-            found = as_buildings(
-                prepared,
-                rectangles,
-                fits,
-                energies,
-                follow_cells=self.outline == "buildings",
-                crs=scene.crs,
-                record=record,
-                source=self.name,
-            )
+        found = as_footprints(
+            prepared,
+            rectangles,
+            fits,
+            energies,
+            level=self.level,
+            crs=scene.crs,
+            record=record,
+            source=self.name,
+        )
         return found, prepared

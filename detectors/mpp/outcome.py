@@ -1,4 +1,4 @@
-"""The result of a run as footprints: a rectangle or an outline each, or blocks of all that is built together."""
+"""The result of a run as footprints: parts, buildings or blocks."""
 
 from __future__ import annotations
 
@@ -6,19 +6,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
 from .arrays import Floats, Rectangles
 from .blocks import outline_blocks
-from .buildings import outline_buildings
 from .energy import ground_variance
 from .preparation import Prepared
-from .rectangles import to_world
 from .roofs import KINDS, RoofFit, fit_roof
+from .rows import find_levels
 
-__all__ = ["as_blocks", "as_buildings", "fit_roofs"]
+__all__ = ["as_footprints", "fit_roofs"]
 
 
 def fit_roofs(prepared: Prepared, rectangles: Rectangles) -> list[RoofFit]:
@@ -28,47 +26,46 @@ def fit_roofs(prepared: Prepared, rectangles: Rectangles) -> list[RoofFit]:
     return [fit_roof(prepared.tables, one, rules, ground_variance(one, model)) for one in rectangles]
 
 
-def as_buildings(
+def as_footprints(
     prepared: Prepared,
     rectangles: Rectangles,
     fits: Sequence[RoofFit],
     energies: Floats,
     *,
-    follow_cells: bool,
+    level: str,
     crs: str | None,
     record: dict[str, Any],
     source: str,
 ) -> Footprints:
-    """Return one footprint a rectangle, with the attributes height, tau, slope (m, m, m/m), roof and energy.
+    """Return the footprints of a level (``part``, ``building`` or ``block``), see `rows`.
 
-    Footprints are the rectangles, or where `follow_cells` is set and a rectangle is no good outline, its part of the
-    block (`buildings`).
+    Every footprint has the attribute ``part_of``: the number of the building of a part, of the block of a building,
+    and of a block its own. Parts and buildings have height, tau, slope (m, m, m/m), roof and energy, too: buildings
+    those of their largest part, with the energies added up.
     """
-    if follow_cells:
-        outlines = outline_buildings(rectangles, _blocks(prepared, rectangles), prepared.grid)
-    else:
-        outlines = shapely.polygons(to_world(rectangles, prepared.grid))
+    blocks = outline_blocks(rectangles, prepared.grid, prepared.state, prepared.score)
+    if level == "block":
+        attributes: dict[str, NDArray[Any]] = {"part_of": np.arange(len(blocks))}
+        return Footprints.of(blocks, crs=crs, attributes=attributes, metadata=record, source=source)
+    levels = find_levels(rectangles, blocks, prepared.height, prepared.state, prepared.grid)
+    main = levels.rectangle_of_part
+    energy: NDArray[Any] = energies[main] / np.bincount(main, minlength=len(rectangles))[main]
+    outlines, part_of = levels.parts, levels.building_of_part
+    if level == "building":
+        outlines, part_of = levels.buildings, levels.block_of_building
+        energy = np.bincount(levels.building_of_part, weights=energy, minlength=len(outlines))
+        main = main[levels.largest_part]
     return Footprints.of(
         outlines,
         crs=crs,
         attributes={
-            "height": np.array([fit.height for fit in fits], dtype=np.float64),
-            "tau": np.array([fit.tau for fit in fits], dtype=np.float64),
-            "slope": np.array([fit.slope for fit in fits], dtype=np.float64),
-            "roof": np.array([KINDS[fit.kind] for fit in fits], dtype=str),
-            "energy": energies,
+            "part_of": part_of,
+            "height": np.array([fits[k].height for k in main], dtype=np.float64),
+            "tau": np.array([fits[k].tau for k in main], dtype=np.float64),
+            "slope": np.array([fits[k].slope for k in main], dtype=np.float64),
+            "roof": np.array([KINDS[fits[k].kind] for k in main], dtype=str),
+            "energy": energy,
         },
         metadata=record,
         source=source,
     )
-
-
-def as_blocks(
-    prepared: Prepared, rectangles: Rectangles, *, crs: str | None, record: dict[str, Any], source: str
-) -> Footprints:
-    """Return one footprint a block that the rectangles belong to, outlined along its cells (`blocks`)."""
-    return Footprints.of(_blocks(prepared, rectangles), crs=crs, metadata=record, source=source)
-
-
-def _blocks(prepared: Prepared, rectangles: Rectangles) -> NDArray[np.object_]:
-    return outline_blocks(rectangles, prepared.grid, prepared.state, prepared.score)

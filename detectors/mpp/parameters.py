@@ -98,10 +98,10 @@ class MPPParameters(Parameterised):
         source=_OWN,
         swept=(0, 0.005, 0.01),
     )
-    outline: str = parameter(
-        "buildings",
-        choices=("buildings", "rectangles", "blocks"),
-        doc="an outline per house or wing, a rectangle where it fits; rectangles alone; an outline per block",
+    level: str = parameter(
+        "building",
+        choices=("part", "building", "block"),
+        doc="what a footprint is: a house, wing or annex; a building, rows cut into houses; all that is built together",
         source=_OWN,
     )
     roofs: str = parameter(

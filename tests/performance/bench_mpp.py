@@ -2,7 +2,7 @@
 
 Run by hand: ``python tests/performance/bench_mpp.py [stages] [moves] [budget] [threads] [span] [memory]`` (all
 without names), ``--scenes toronto-a,vaihingen-a --repeats 5 --plot docs/images/mpp-budget.png``, and
-``--outline buildings`` for outlines along the cells as well.
+``--level`` chooses the level.
 
 From arrays in memory to rectangles, after the kernels are compiled. CPU seconds of one thread where threads are not the
 subject, the median and the least of the repeats. Threads: wall seconds of one and of two threads in turn, side by side,
@@ -40,9 +40,9 @@ STAGES = {
     "chains": ("annealing", "run_chain"),
     "local search of seams": ("city", "search"),
     "walls": ("city", "close_walls"),
-    "footprints": ("mpp_detector", "as_buildings"),
+    "footprints": ("mpp_detector", "as_footprints"),
 }
-OUTLINE = "rectangles"
+LEVEL = "rectangles"
 EFFORTS = (0, 0.1, 0.25, 0.5, 1, 2, 4)
 
 
@@ -72,7 +72,7 @@ def scene_of(name):
 
 
 def detect(scene, seed=0, **parameters):
-    named = ",".join(f"{name}={value}" for name, value in {"outline": OUTLINE, **parameters}.items())
+    named = ",".join(f"{name}={value}" for name, value in {"level": LEVEL, **parameters}.items())
     return rb.make_detector(f"mpp[{named}]").detect(scene, np.random.default_rng(seed))
 
 
@@ -309,11 +309,11 @@ def main():
     parser.add_argument("parts", nargs="*", help="stages, moves, budget, threads, span, memory")
     parser.add_argument("--scenes", default="toronto-a,vaihingen-a")
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--outline", default="rectangles", help="buildings, rectangles or blocks")
+    parser.add_argument("--level", default="building", help="part, building or block")
     parser.add_argument("--plot", help="where to save the picture of quality against time")
     options = parser.parse_args()
-    global OUTLINE
-    OUTLINE = options.outline
+    global LEVEL
+    LEVEL = options.level
     parts = options.parts or ["stages", "moves", "budget", "threads", "span", "memory"]
     if parts == ["memory-of"]:
         memory(options.scenes)
@@ -337,7 +337,7 @@ def main():
             with tempfile.TemporaryDirectory() as folder:
                 save(scene, folder)
                 subprocess.run(
-                    [sys.executable, __file__, "memory-of", "--scenes", folder, "--outline", OUTLINE], check=True
+                    [sys.executable, __file__, "memory-of", "--scenes", folder, "--level", LEVEL], check=True
                 )
 
 

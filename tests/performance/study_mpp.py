@@ -37,7 +37,8 @@ ABLATIONS = {
     "overlap is free": "overlap=0",
     "strips are buildings": "slender=1000,part_share=0",
     "a roof in sum is enough": "least_evidence=0",
-    "rectangles alone": "outline=rectangles",
+    "parts": "level=part",
+    "blocks": "level=block",
 }
 FACTORS = (0.5, 2.0)
 NUMBERS = (

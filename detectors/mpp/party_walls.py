@@ -1,0 +1,165 @@
+"""Party walls: where the roof of a row of houses is cut across, seen in the heights of its cells.
+
+Nouns
+-----
+profile
+    Heights inside a rectangle on a lattice of `_LATTICE`, one row for each station along its longer side, one column
+    for each line across; NaN where the cell is not high. The outermost lines are left out: eaves and gutters.
+step
+    Median over the lines of the height just behind a station less that just before it, and the share of the lines that
+    agree in sign and exceed the noise.
+valley
+    Median over the lines of how far a station lies below the roof on both sides, and the share of the lines with one:
+    the gutter between two gables that face the street.
+party wall
+    A station with a step or a valley through most of the lines, at least `_NARROWEST` from other ones and from the
+    ends. Walls are found twice: *certain* ones show that a building is a row, *probable* ones cut a row into houses.
+
+The thresholds were chosen on the development scenes (docs/results/mpp.md), not on scenes kept for tests.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scenes.geodata.raster import Grid
+from .arrays import Floats, Rectangles
+from .cells import HIGH
+from .rectangles import corners
+
+__all__ = ["CERTAIN", "PROBABLE", "Wall", "WallRule", "party_walls", "wall_strength"]
+
+#: Metres: spacing of the lattice, narrowest house, smallest depth of a row, widest house of a row (median).
+_LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 4.5, 12.0
+#: Stations that a mean reaches on either side, and that lie between a valley and its shoulders.
+_REACH, _SHOULDER = 2, 2
+#: Metres: height differences that are noise, for steps and for valleys.
+_STEP_NOISE, _VALLEY_NOISE = 0.12, 0.25
+#: Share of the lines that must have heights for a step, and for a valley.
+_KNOWN_STEP, _KNOWN_VALLEY = 0.6, 0.5
+
+
+class WallRule(NamedTuple):
+    """What makes a party wall of a step or of a valley.
+
+    Attributes
+    ----------
+    step_share, valley_share : float
+        Least share of the lines that show it.
+    step, valley : float
+        Least median over the lines, m.
+    """
+
+    step_share: float
+    step: float
+    valley_share: float
+    valley: float
+
+
+CERTAIN = WallRule(0.75, 0.25, 0.75, 0.4)
+PROBABLE = WallRule(0.55, 0.1, 0.5, 0.15)
+
+
+class Wall(NamedTuple):
+    """A party wall in the grid frame: a point on it and the direction along it, each of shape (2,), unit length."""
+
+    point: Floats
+    along: Floats
+
+
+def party_walls(
+    rectangle: Rectangles, height: NDArray[np.uint16], state: NDArray[np.uint8], grid: Grid, rule: WallRule
+) -> list[Wall]:
+    """Return the party walls across the longer side of a rectangle, in order; none where houses would be wide.
+
+    Parameters
+    ----------
+    rectangle : ndarray, shape (5,)
+        Grid frame.
+    height : ndarray of uint16, shape (rows, columns)
+        Height above ground, cm.
+    state : ndarray of uint8, shape (rows, columns)
+        See `cells`.
+    grid : Grid
+    rule : WallRule
+    """
+    place = corners(rectangle)[0] * grid.gsd
+    first, second = place[1] - place[0], place[3] - place[0]
+    if np.hypot(*first) < np.hypot(*second):
+        first, second = second, first
+    length, depth = float(np.hypot(*first)), float(np.hypot(*second))
+    if length < 2 * _NARROWEST or depth < _SHALLOWEST:
+        return []
+    u, v = first / length, second / depth
+    stations = np.arange(_LATTICE / 2, length, _LATTICE)
+    lines = np.arange(_LATTICE / 2, depth, _LATTICE)[1:-1]
+    x, y = (place[0] + stations[:, None, None] * u + lines[None, :, None] * v).transpose(2, 0, 1) / grid.gsd
+    column = np.clip(x.astype(np.int64), 0, grid.columns - 1)
+    row = np.clip(y.astype(np.int64), 0, grid.rows - 1)
+    profile = np.where(state[row, column] == HIGH, height[row, column] / 100.0, np.nan)
+    found: list[float] = []
+    strength = wall_strength(profile, rule)
+    for station in np.argsort(-strength, kind="stable"):
+        if strength[station] <= 0:
+            break
+        at = station * _LATTICE
+        if _NARROWEST <= at <= length - _NARROWEST and all(abs(at - other) >= _NARROWEST for other in found):
+            found.append(at)
+    found.sort()
+    if not found or np.median(np.diff([0.0, *found, length])) > _WIDEST:
+        return []
+    return [Wall((place[0] + at * u) / grid.gsd, v) for at in found]
+
+
+def wall_strength(profile: Floats, rule: WallRule) -> Floats:
+    """Return the evidence for a wall before each station of a profile, m, shape (stations,); 0 where there is none."""
+    count = len(profile)
+    strength = np.zeros(count)
+    if count < 2 * (_REACH + _SHOULDER):
+        return strength
+    means = _means(profile, _REACH)  # of stations i to i + _REACH - 1
+    before, behind = np.full_like(profile, np.nan), np.full_like(profile, np.nan)
+    before[_REACH:], behind[: len(means)] = means[: count - _REACH], means
+    step = behind - before
+    known = np.isfinite(step)
+    middle = _median(step)
+    agree = known & (np.sign(step) == np.sign(middle)[:, None]) & (np.abs(step) > _STEP_NOISE)
+    enough = known.mean(axis=1) >= _KNOWN_STEP
+    share = agree.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    stepped = enough & (share >= rule.step_share) & (np.abs(middle) >= rule.step)
+    strength[stepped] += np.abs(middle[stepped])
+
+    low = np.full_like(profile, np.nan)
+    low[1:] = np.fmin(profile[1:], profile[:-1])
+    left, right = np.full_like(profile, np.nan), np.full_like(profile, np.nan)
+    far = _REACH + _SHOULDER
+    left[far:] = means[: count - far]
+    right[: len(means) - _SHOULDER] = means[_SHOULDER:]
+    valley = (left + right) / 2 - low
+    known = np.isfinite(valley)
+    middle = _median(valley)
+    share = (known & (valley > _VALLEY_NOISE)).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    sunk = (known.mean(axis=1) >= _KNOWN_VALLEY) & (share >= rule.valley_share) & (middle >= rule.valley)
+    strength[sunk] += middle[sunk]
+    return strength
+
+
+def _means(profile: Floats, reach: int) -> Floats:
+    """Return the mean of the known heights of `reach` stations in a row, shape (stations - reach + 1, lines)."""
+    known = np.isfinite(profile)
+    total = np.cumsum(np.vstack([np.zeros((1, profile.shape[1])), np.where(known, profile, 0.0)]), axis=0)
+    number = np.cumsum(np.vstack([np.zeros((1, profile.shape[1]), dtype=np.int64), known]), axis=0)
+    total, number = total[reach:] - total[:-reach], number[reach:] - number[:-reach]
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def _median(values: Floats) -> Floats:
+    """Return the median of the known values of each station, 0 without any."""
+    some = np.isfinite(values).any(axis=1)
+    medians = np.zeros(len(values))
+    if some.any():
+        medians[some] = np.nanmedian(values[some], axis=1)
+    return medians

@@ -1,0 +1,207 @@
+"""Rows: which parts are one building, and which buildings stand wall to wall.
+
+Nouns
+-----
+part
+    What one rectangle describes: a house, a wing, an annex.
+block
+    All that is built together (`blocks`).
+row
+    A block with at least `_CERTAIN_WALLS` certain party walls. Its parts are cut at their probable party walls, and
+    each piece is a house of its own unless it is smaller than `_ANNEX`.
+building
+    A block that is no row with all its parts, or a house of a row with its annexes. A part outside all blocks is a
+    building, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...scenes.geodata.raster import Grid
+from .arrays import Rectangles
+from .buildings import block_of, outline_buildings
+from .party_walls import CERTAIN, PROBABLE, Wall, party_walls
+from .rectangles import to_world
+
+__all__ = ["Levels", "find_levels"]
+
+#: Certain party walls that make a row of a block.
+_CERTAIN_WALLS = 4
+#: Square metres: smaller pieces of a row belong to the house that they touch most; the smallest piece that is one.
+_ANNEX, _PIECE = 15.0, 8.0
+#: Metres: pieces so close touch, and by how much outlines are closed when they are joined.
+_TOUCH, _CLOSE = 0.3, 0.05
+#: Metres: shortest common wall of an annex and its house.
+_WALL = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """Outlines of parts and of buildings, and how they belong together.
+
+    Attributes
+    ----------
+    parts : ndarray of polygons, shape (p,)
+    rectangle_of_part : ndarray of int64, shape (p,)
+        Row of the rectangle that describes a part; a rectangle across several houses describes several parts.
+    building_of_part : ndarray of int64, shape (p,)
+    buildings : ndarray of polygons, shape (b,)
+    block_of_building : ndarray of int64, shape (b,)
+        Blocks are numbered first; a building outside all blocks has a number of its own.
+    """
+
+    parts: NDArray[np.object_]
+    rectangle_of_part: NDArray[np.int64]
+    building_of_part: NDArray[np.int64]
+    buildings: NDArray[np.object_]
+    block_of_building: NDArray[np.int64]
+
+    @property
+    def largest_part(self) -> NDArray[np.int64]:
+        """Row of the largest part of each building, shape (b,)."""
+        order = np.lexsort((-shapely.area(self.parts), self.building_of_part))
+        first = np.unique(self.building_of_part[order], return_index=True)[1]
+        rows: NDArray[np.int64] = order[first].astype(np.int64)
+        return rows
+
+
+def find_levels(
+    rectangles: Rectangles,
+    blocks: NDArray[np.object_],
+    height: NDArray[np.uint16],
+    state: NDArray[np.uint8],
+    grid: Grid,
+) -> Levels:
+    """Return parts and buildings.
+
+    Parameters
+    ----------
+    rectangles : ndarray, shape (n, 5)
+        Grid frame.
+    blocks : ndarray of shapely Polygons
+        As `blocks.outline_blocks` returns them.
+    height : ndarray of uint16, shape (rows, columns)
+        Height above ground, cm.
+    state : ndarray of uint8, shape (rows, columns)
+        See `cells`.
+    grid : Grid
+    """
+    block = block_of(shapely.polygons(to_world(rectangles, grid)), blocks)
+    certain = np.array([len(party_walls(one, height, state, grid, CERTAIN)) for one in rectangles], dtype=np.int64)
+    walls_of_block = np.bincount(block[block >= 0], weights=certain[block >= 0], minlength=len(blocks))
+    row = walls_of_block >= _CERTAIN_WALLS
+    outlines = outline_buildings(rectangles, blocks, grid)
+    parts: list[Any] = []
+    rectangle_of: list[int] = []
+    building_of: list[int] = []
+    buildings: list[Any] = []
+    block_of_building: list[int] = []
+    for k in np.flatnonzero(block < 0).tolist():
+        parts.append(outlines[k])
+        rectangle_of.append(k)
+        building_of.append(len(buildings))
+        buildings.append(outlines[k])
+        block_of_building.append(len(blocks) + len(block_of_building))
+    for number in np.unique(block[block >= 0]).tolist():
+        members = np.flatnonzero(block == number)
+        if not row[number]:
+            parts += list(outlines[members])
+            rectangle_of += members.tolist()
+            building_of += [len(buildings)] * len(members)
+            buildings.append(blocks[number])
+            block_of_building.append(number)
+            continue
+        walls = {
+            k: party_walls(rectangles[k], height, state, grid, PROBABLE) if certain[k] else [] for k in members.tolist()
+        }
+        pieces, owners = _pieces(rectangles[members], blocks[number], [walls[k] for k in members.tolist()], grid)
+        group = _houses(pieces, owners)
+        parts += pieces
+        rectangle_of += members[owners].tolist()
+        building_of += (group + len(buildings)).tolist()
+        houses = [_joined([pieces[k] for k in np.flatnonzero(group == g)]) for g in range(group.max() + 1)]
+        buildings += houses
+        block_of_building += [number] * len(houses)
+    return Levels(
+        _objects(parts),
+        np.array(rectangle_of, dtype=np.int64),
+        np.array(building_of, dtype=np.int64),
+        _objects(buildings),
+        np.array(block_of_building, dtype=np.int64),
+    )
+
+
+def _objects(polygons: list[Any]) -> NDArray[np.object_]:
+    array = np.empty(len(polygons), dtype=object)
+    array[:] = polygons
+    return array
+
+
+def _pieces(
+    rectangles: Rectangles, block: Any, walls: list[list[Wall]], grid: Grid
+) -> tuple[list[Any], NDArray[np.int64]]:
+    """Return the pieces of a row, which cover its block, and the row of the rectangle of each."""
+    zones = outline_buildings(rectangles, _objects([block]), grid, always=True)
+    pieces: list[Any] = []
+    owners: list[int] = []
+    for k, (zone, cuts) in enumerate(zip(zones, walls, strict=True)):
+        own = _cut(zone, [_line(wall, grid) for wall in cuts]) if cuts else [zone]
+        pieces += own
+        owners += [k] * len(own)
+    return pieces, np.array(owners, dtype=np.int64)
+
+
+def _line(wall: Wall, grid: Grid, reach: float = 200.0) -> Any:
+    """Return a wall as a line in metres of the CRS, long enough to cross any part."""
+    ends = np.stack([wall.point - wall.along * reach / grid.gsd, wall.point + wall.along * reach / grid.gsd])
+    x, y = grid.to_world(ends[:, 1], ends[:, 0])
+    return shapely.linestrings(np.stack([x, y], axis=1))
+
+
+def _cut(zone: Any, lines: list[Any]) -> list[Any]:
+    """Cut a polygon at lines; pieces below `_PIECE` stay with the one that they touch most."""
+    faces = shapely.get_parts(shapely.polygonize([shapely.unary_union([shapely.boundary(zone), *lines])]))
+    pieces = [face for face in faces if shapely.contains(zone, shapely.point_on_surface(face))]
+    large = [piece for piece in pieces if piece.area >= _PIECE]
+    if not large:
+        return [zone]
+    for scrap in (piece for piece in pieces if piece.area < _PIECE):
+        touching = [shapely.length(shapely.intersection(scrap, piece)) for piece in large]
+        if max(touching) > 0:
+            nearest = int(np.argmax(touching))
+            large[nearest] = shapely.union(large[nearest], scrap)
+    return large
+
+
+def _houses(pieces: list[Any], owners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the house, from 0, of each piece: small ones belong to the piece of another part that they touch most."""
+    house = np.arange(len(pieces))
+    areas = shapely.area(_objects(pieces))
+    tree = shapely.STRtree(pieces)
+    for k in np.argsort(areas, kind="stable").tolist():
+        if areas[k] >= _ANNEX:
+            break
+        near = tree.query(pieces[k], predicate="dwithin", distance=_TOUCH)
+        near = near[(owners[near] != owners[k]) & (areas[near] > areas[k])]
+        if len(near) == 0:
+            continue
+        around = shapely.buffer(pieces[k], _TOUCH)
+        wall = shapely.length(shapely.intersection(shapely.boundary(_objects([pieces[n] for n in near])), around))
+        if wall.max() >= _WALL:
+            house[house == house[k]] = house[near[np.argmax(wall)]]
+    numbers: NDArray[np.int64] = np.unique(house, return_inverse=True)[1].astype(np.int64)
+    return numbers
+
+
+def _joined(pieces: list[Any]) -> Any:
+    """Join pieces to one outline; gaps as narrow as rounding are closed."""
+    if len(pieces) == 1:
+        return pieces[0]
+    grown = shapely.union_all(shapely.buffer(_objects(pieces), _CLOSE, join_style="mitre"))
+    return shapely.buffer(grown, -_CLOSE, join_style="mitre")

@@ -1,0 +1,184 @@
+"""Rows of houses: party walls in profiles, and parts, buildings and blocks."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roofbench.detectors.mpp.cells import HIGH, LOW
+from roofbench.detectors.mpp.party_walls import CERTAIN, PROBABLE, party_walls, wall_strength
+from roofbench.detectors.mpp.rectangles import to_world
+from roofbench.detectors.mpp.rows import find_levels
+from roofbench.scenes.geodata.raster import Grid
+
+GRID = Grid(1000.0, 2000.0, 0.5, 160, 260)
+
+
+def place(*roofs):
+    """Heights (cm) and states of cells with roofs, each (left, top, right, bottom) in metres and a height function."""
+    height = np.zeros((GRID.rows, GRID.columns), dtype=np.uint16)
+    state = np.full((GRID.rows, GRID.columns), LOW, dtype=np.uint8)
+    y, x = (np.mgrid[: GRID.rows, : GRID.columns] + 0.5) * GRID.gsd
+    for (left, top, right, bottom), roof in roofs:
+        inside = (x >= left) & (x < right) & (y >= top) & (y < bottom)
+        height[inside] = np.round(100 * np.broadcast_to(roof(x, y), x.shape)[inside])
+        state[inside] = HIGH
+    return height, state
+
+
+def rectangle(left, top, right, bottom):
+    return np.array([left + right, top + bottom, 2 * (right - left), 2 * (bottom - top), 0.0])
+
+
+def gables(width, start):
+    """Gables that face the street: the ridge of each house runs across the row."""
+    return lambda x, y: 9.0 - np.abs((x - start) % width - width / 2)
+
+
+def steps(width, start, rise):
+    return lambda x, y: 7.0 + rise * (((x - start) // width) % 2)
+
+
+def flat(x, y):
+    return 8.0
+
+
+def walls_at(roof, sides, rule=CERTAIN):
+    found = party_walls(rectangle(*sides), *place((sides, roof)), GRID, rule)
+    return [wall.point[0] * GRID.gsd for wall in found]
+
+
+@pytest.mark.parametrize("roof", [gables(6.0, 10.0), steps(6.0, 10.0, 0.5)], ids=["valleys", "steps"])
+def test_walls_between_equal_houses_are_found(roof):
+    found = walls_at(roof, (10, 10, 46, 20))
+    assert len(found) == 5
+    np.testing.assert_allclose(found, [16, 22, 28, 34, 40], atol=0.5)
+
+
+def test_low_steps_are_probable_but_not_certain():
+    roof = steps(6.0, 10.0, 0.18)
+    assert walls_at(roof, (10, 10, 46, 20)) == []
+    assert len(walls_at(roof, (10, 10, 46, 20), PROBABLE)) == 5
+
+
+@pytest.mark.parametrize(
+    ("roof", "sides"),
+    [
+        (flat, (10, 10, 60, 20)),  # a hall
+        (steps(25.0, 10.0, 1.0), (10, 10, 110, 22)),  # four large buildings, too wide for houses
+        (gables(6.0, 10.0), (10, 10, 46, 13)),  # too shallow
+        (gables(3.0, 10.0), (10, 10, 17, 20)),  # too short for two houses
+        (lambda x, y: 9 - np.abs(y - 15), (10, 10, 60, 20)),  # one ridge along all of it
+    ],
+    ids=["flat", "wide", "shallow", "short", "ridge"],
+)
+def test_what_is_no_row_has_no_walls(roof, sides):
+    assert walls_at(roof, sides) == []
+
+
+def test_walls_turn_with_the_row():
+    height, state = place(((0, 0, 130, 80), lambda x, y: 9.0 - np.abs((u(x, y)) % 6.0 - 3.0)))
+    row = np.array([130.0, 80.0, 72.0, 20.0, math.radians(30)])
+    found = party_walls(row, height, state, GRID, CERTAIN)
+    assert len(found) == 5
+    for wall in found:
+        np.testing.assert_allclose(np.abs(wall.along), [0.5, math.sqrt(0.75)], atol=1e-12)
+
+
+def u(x, y):
+    """Metres along a row at 30 degrees through (65, 40)."""
+    return (x - 65) * math.cos(math.radians(30)) + (y - 40) * math.sin(math.radians(30)) + 18
+
+
+def slow_strength(profile, rule):
+    """The definition of a wall's strength, station by station and line by line."""
+
+    def mean(values):
+        known = [value for value in values if not math.isnan(value)]
+        return sum(known) / len(known) if known else math.nan
+
+    def median(values):
+        known = [value for value in values if not math.isnan(value)]
+        return float(np.median(known)) if known else 0.0
+
+    stations, lines = profile.shape
+    strength = np.zeros(stations)
+    for i in range(stations):
+        jumps, valleys = [], []
+        for k in range(lines):
+            jump = valley = math.nan
+            if i >= 2 and i + 2 <= stations:
+                jump = mean(profile[i : i + 2, k]) - mean(profile[i - 2 : i, k])
+            if i >= 4 and i + 4 <= stations:
+                lows = [value for value in profile[i - 1 : i + 1, k] if not math.isnan(value)]
+                shoulders = (mean(profile[i - 4 : i - 2, k]) + mean(profile[i + 2 : i + 4, k])) / 2
+                valley = shoulders - min(lows) if lows else math.nan
+            jumps.append(jump)
+            valleys.append(valley)
+        known = [value for value in jumps if not math.isnan(value)]
+        middle = median(jumps)
+        agree = sum(np.sign(value) == np.sign(middle) and abs(value) > 0.12 for value in known)
+        if len(known) >= 0.6 * lines and known and agree >= rule.step_share * len(known) and abs(middle) >= rule.step:
+            strength[i] += abs(middle)
+        known = [value for value in valleys if not math.isnan(value)]
+        middle = median(valleys)
+        deep = sum(value > 0.25 for value in known)
+        if len(known) >= 0.5 * lines and known and deep >= rule.valley_share * len(known) and middle >= rule.valley:
+            strength[i] += middle
+    return strength
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(8, 30), st.integers(1, 9), st.sampled_from([CERTAIN, PROBABLE]))
+def test_the_strength_of_walls_is_that_of_plain_loops(seed, stations, lines, rule):
+    rng = np.random.default_rng(seed)
+    profile = 8 + rng.normal(0, 0.1, (stations, lines)) + rng.choice([0, 0.4, 1.0], stations)[:, None]
+    profile[rng.random(profile.shape) < rng.choice([0, 0.2, 0.6])] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        expected = slow_strength(profile, rule)
+    np.testing.assert_allclose(wall_strength(profile, rule), expected, atol=1e-9)
+
+
+def levels(roofs, rectangles):
+    height, state = place(*roofs)
+    rectangles = np.array(rectangles)
+    outlines = shapely.polygons(to_world(rectangles, GRID))
+    blocks = shapely.get_parts(shapely.union_all(shapely.buffer(outlines, 0.01, join_style="mitre")))
+    return find_levels(rectangles, blocks, height, state, GRID), blocks
+
+
+def test_a_row_is_cut_into_houses_and_an_annex_belongs_to_one():
+    row, annex = (10, 10, 46, 20), (23, 20, 27, 23)
+    found, blocks = levels([(row, gables(6.0, 10.0)), (annex, flat)], [rectangle(*row), rectangle(*annex)])
+    assert len(blocks) == 1
+    assert len(found.parts) == 7
+    assert len(found.buildings) == 6
+    areas = np.sort(shapely.area(found.buildings))
+    np.testing.assert_allclose(areas, [60, 60, 60, 60, 60, 72], rtol=0.1)
+    assert shapely.area(found.buildings).sum() == pytest.approx(blocks[0].area, rel=0.02)
+    assert set(found.block_of_building) == {0}
+    of_annex = found.building_of_part[found.rectangle_of_part == 1]
+    assert shapely.area(found.buildings)[of_annex[0]] == areas.max()
+
+
+def test_a_house_with_a_wing_is_one_building_and_a_part_outside_blocks_another():
+    house, wing, far = (10, 10, 30, 20), (30, 12, 38, 18), (80, 40, 90, 50)
+    found, blocks = levels([(house, flat), (wing, flat)], [rectangle(*house), rectangle(*wing)])
+    assert len(found.buildings) == len(blocks) == 1
+    assert list(found.building_of_part) == [0, 0]
+    assert found.rectangle_of_part[found.largest_part].tolist() == [0]
+    rectangles = np.array([rectangle(*house), rectangle(*far)])
+    height, state = place((house, flat))
+    own = shapely.polygons(to_world(rectangles[:1], GRID))
+    alone = find_levels(rectangles, own, height, state, GRID)
+    assert len(alone.buildings) == 2
+    assert sorted(alone.block_of_building) == [0, 1]
+
+
+def test_nothing_has_no_levels():
+    found = find_levels(np.empty((0, 5)), np.empty(0, dtype=object), *place(), GRID)
+    assert len(found.parts) == len(found.buildings) == 0
