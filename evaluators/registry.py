@@ -19,10 +19,12 @@ EVALUATORS = Registry(
     Evaluator,
     {
         DEFAULT: "evaluators.threshold_free.evaluator:ThresholdFree",
+        "iou": "evaluators.iou:IoU",
         "mobj0": "evaluators.mobj0:Mobj0",
         "rutzinger": "evaluators.rutzinger:Rutzinger",
         "shan-lee": "evaluators.shan_lee:ShanLee",
         "shufelt": "evaluators.shufelt:Shufelt",
+        "song-haithcoat": "evaluators.song_haithcoat:SongHaithcoat",
     },
 )
 

@@ -23,11 +23,14 @@ class SideVerdicts:
     correct : ndarray of bool, shape (n,)
     reasons : sequence of str, n of them
     measures : mapping of str to ndarray, shape (n,)
+    partner : ndarray of int64, shape (n,), optional
+        Row of each object's partner, or -1; its main partner is named where this is -1 or not given.
     """
 
     correct: NDArray[np.bool_]
     reasons: Sequence[str]
     measures: Mapping[str, NDArray[np.float64]]
+    partner: NDArray[np.int64] | None = None
 
 
 def coverage_kinds(
@@ -60,7 +63,7 @@ def coverage_verdicts(
     detections: SideVerdicts,
     references: SideVerdicts,
 ) -> Verdicts:
-    """Put the verdicts of both sides together; the partner of an object is its main partner.
+    """Put the verdicts of both sides together.
 
     Parameters
     ----------
@@ -78,12 +81,16 @@ def coverage_verdicts(
             else (sets.reference, sets.detected, sets.references, sets.of_references)
         )
         left_out = counted.reasons.tolist()
+        partner = coverage.partner_ids(others)
+        if given.partner is not None:
+            chosen = given.partner >= 0
+            partner[chosen] = others.ids[given.partner[chosen]]
         tables.append(
             VerdictTable(
                 ids=own.ids,
                 kinds=tuple(kind.key for kind in kinds if kind.side == side),
                 kind=np.where(counted.mask, np.where(given.correct, 0, 1), 2).astype(np.uint8),
-                partner=coverage.partner_ids(others),
+                partner=partner,
                 measures={measure.key: np.asarray(given.measures[measure.key], dtype=float) for measure in measures},
                 reasons=tuple(out or reason for out, reason in zip(left_out, given.reasons, strict=True)),
             )

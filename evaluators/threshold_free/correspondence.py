@@ -1,4 +1,4 @@
-"""Correspondence: which detection stands for which reference.
+"""Correspondence: which detection is matched with which reference.
 
 A *pseudo one-to-one correspondence* gives each footprint of one set at most one partner in the other, without any
 threshold (Awrangjeb et al. 2010, section 4.1). Then
@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..overlay.greedy import accept_in_order
 from ..overlay.overlaps import Overlaps
 
 __all__ = ["DECIMALS", "MATCHINGS", "Correspondence", "match"]
@@ -97,7 +98,7 @@ def match(
     order = by_distance
     if matching == "overlap":
         order = np.lexsort((overlaps.first, overlaps.second, rounded, -area))
-    of_detection, of_reference = _sweep(overlaps.first[order], overlaps.second[order], counts)
+    of_detection, of_reference = accept_in_order(overlaps.first[order], overlaps.second[order], counts)
     return Correspondence(of_detection, of_reference, nearest)
 
 
@@ -107,30 +108,3 @@ def _first_of_each(keys: NDArray[np.int64], values: NDArray[np.int64], count: in
     # Later assignments win, so the reversed order leaves the first.
     first[keys[::-1]] = values[::-1]
     return first
-
-
-def _sweep(
-    detections: NDArray[np.int64], references: NDArray[np.int64], counts: tuple[int, int]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Accept pairs in order while both sides are free."""
-    of_detection = np.full(counts[0], -1, dtype=np.int64)
-    of_reference = np.full(counts[1], -1, dtype=np.int64)
-    # A pair whose two sides occur nowhere else is accepted in any order: only contested pairs need the loop.
-    lonely = (np.bincount(detections, minlength=counts[0])[detections] == 1) & (
-        np.bincount(references, minlength=counts[1])[references] == 1
-    )
-    of_detection[detections[lonely]] = references[lonely]
-    of_reference[references[lonely]] = detections[lonely]
-    taken_detections, taken_references = set(), set()
-    accepted = []
-    contested = zip(detections[~lonely].tolist(), references[~lonely].tolist(), strict=True)
-    for detection, reference in contested:
-        if detection not in taken_detections and reference not in taken_references:
-            taken_detections.add(detection)
-            taken_references.add(reference)
-            accepted.append((detection, reference))
-    if accepted:
-        rows = np.array(accepted, dtype=np.int64)
-        of_detection[rows[:, 0]] = rows[:, 1]
-        of_reference[rows[:, 1]] = rows[:, 0]
-    return of_detection, of_reference

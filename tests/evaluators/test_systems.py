@@ -7,7 +7,7 @@ import pytest
 import shapely
 from builders.footprint_sets import random_detections, random_reference
 from naive.evaluation import overlap
-from naive.systems import covered_share, groups, main_partner, touched
+from naive.systems import average_precision, covered_share, greedy, groups, iou, main_partner, touched
 
 import roofbench as rb
 from roofbench.evaluators.registry import EVALUATORS
@@ -201,3 +201,120 @@ def test_shan_and_lee_agree_with_plain_loops(seed):
             assert frame.loc[row, "overlap"] == pytest.approx(shared / other)
             assert frame.loc[row, "fitness"] == pytest.approx(shared / (other + polygon.area - shared))
             assert frame.loc[row, "extralap"] == pytest.approx((other - shared) / polygon.area, abs=1e-9)
+
+
+def test_song_and_haithcoat_by_hand():
+    notched = house(300) - house(300, 2, depth=2)  # 6 corners, 96 m2, same perimeter
+    found = evaluate("song-haithcoat", [*DETECTED, notched], [*REFERENCE, house(300)])
+    assert found.values["detection.rate"] == pytest.approx(5 / 6)
+    assert found.values["detection.correctness"] == pytest.approx(5 / 6)
+    # Main partners: the shifted house, one of the halves, twice the wide one, the notched one.
+    assert found.values["overlay.matched"] == pytest.approx((90 + 50 + 100 + 100 + 96) / 500)
+    assert found.values["overlay.omission"] == pytest.approx(64 / 500)
+    assert found.values["overlay.commission"] == pytest.approx(1 - 436 / (100 + 50 + 210 + 210 + 96))
+    assert found.values["shape.corner_difference"] == pytest.approx(2 / 5)
+    assert found.values["shape.area_difference"] == pytest.approx((0 + 0.5 + 1.1 + 1.1 + 0.04) / 5)
+    assert found.values["shape.perimeter_difference"] == pytest.approx((0 + 0.25 + 22 / 40 * 2 + 0) / 5)
+    wide, half = 4 * np.pi * 210 / 62**2, 4 * np.pi * 50 / 30**2
+    square, notch = 4 * np.pi * 100 / 40**2, 4 * np.pi * 96 / 40**2
+    assert found.values["shape.compactness_ratio"] == pytest.approx(
+        (1 + half / square + 2 * wide / square + notch / square) / 5
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_song_and_haithcoat_agree_with_plain_loops(seed):
+    detected, reference = sets_of(seed)
+    values = evaluate("song-haithcoat", detected, reference).values
+    partners = {r: main_partner(polygon, detected) for r, polygon in enumerate(reference)}
+    pairs = [(detected[d], reference[r]) for r, d in partners.items() if d is not None]
+    assert values["detection.rate"] == (len(pairs) / len(reference) if reference else None)
+    if pairs and all(_has_one_best(polygon, detected) for polygon in reference):
+        shared = sum(overlap(one, two) for one, two in pairs)
+        assert values["overlay.matched"] == pytest.approx(shared / sum(two.area for _, two in pairs))
+        assert values["overlay.commission"] == pytest.approx(1 - shared / sum(one.area for one, _ in pairs), abs=1e-9)
+        difference = [abs(one.length - two.length) / two.length for one, two in pairs]
+        assert values["shape.perimeter_difference"] == pytest.approx(np.mean(difference), abs=1e-9)
+
+
+def _has_one_best(polygon, others):
+    """Return whether no two polygons share the same largest area: then either would be the partner."""
+    areas = sorted((overlap(polygon, other) for other in others), reverse=True)
+    return len(areas) < 2 or areas[0] == 0 or areas[0] - areas[1] > 1e-6
+
+
+def test_iou_by_hand():
+    found = evaluate("iou", DETECTED, REFERENCE)
+    # IoU: shifted 90/110; halves 0.5 each, of which one is matched; the wide one 100/210 with either house.
+    counts = found.tallies.counts
+    assert (counts.true_positives, counts.false_positives, counts.false_negatives) == (2, 3, 3)
+    assert (found.values["iou.precision"], found.values["iou.recall"], found.values["iou.f1"]) == (0.4, 0.4, 0.4)
+    # 0.45 would add the wide one and a house of its own, 0.55 would lose a half and its house.
+    assert found.values["iou.flipped"] == pytest.approx(4 / 10)
+    assert found.values["panoptic.quality"] == pytest.approx((90 / 110) / 5), "an IoU of just 0.5 is no panoptic pair"
+    assert found.values["ap.ar"] == pytest.approx((2 / 5 + 6 * 1 / 5) / 10)
+    one = found.verdicts
+    assert one.detection_table.verdicts.tolist()[0] == "TP"
+    assert one.reference_table.partner[0] == 0
+
+
+def test_a_sliver_of_two_percent_is_no_true_positive_of_iou():
+    assert evaluate("iou", [house(9.8)], [house(0)]).values["iou.recall"] == 0.0
+
+
+@pytest.mark.parametrize("with_confidence", [False, True])
+@pytest.mark.parametrize("threshold", [0.3, 0.5])
+@pytest.mark.parametrize("seed", range(15))
+def test_iou_agrees_with_plain_loops(seed, threshold, with_confidence):
+    detected, reference = sets_of(seed)
+    if not detected or not reference:
+        return
+    confidence = np.random.default_rng(seed).permutation(len(detected)) / 100 if with_confidence else None
+    attributes = {"confidence": confidence} if with_confidence else {}
+    found = rb.evaluate(
+        rb.Footprints.of(detected, attributes=attributes), rb.Footprints.of(reference), evaluator="iou",
+        threshold=threshold,
+    )  # fmt: skip
+    matches = greedy(detected, reference, confidence, threshold)
+    assert found.tallies.counts.true_positives == len(matches)
+    best = [max(iou(one, two) for two in reference) for one in detected]
+    ranked = best if confidence is None else confidence.tolist()
+    if len(set(ranked)) == len(ranked):
+        at_half = greedy(detected, reference, confidence, 0.5)
+        order = sorted(range(len(detected)), key=lambda d: -ranked[d])
+        expected = average_precision([d in at_half for d in order], len(reference))
+        assert found.values["ap.ap_50"] == pytest.approx(expected)
+        levels = [greedy(detected, reference, confidence, round(0.5 + 0.05 * k, 2)) for k in range(10)]
+        expected = np.mean([average_precision([d in level for d in order], len(reference)) for level in levels])
+        assert found.values["ap.ap"] == pytest.approx(expected)
+        assert found.values["ap.ar"] == pytest.approx(np.mean([len(level) for level in levels]) / len(reference))
+
+
+def test_average_precision_has_no_cap_on_the_number_of_objects():
+    houses = [house(20 * (k % 100), y=20 * (k // 100)) for k in range(10_000)]
+    found = evaluate("iou", houses, houses)
+    assert (found.values["ap.ap"], found.values["ap.ar"], found.values["iou.f1"]) == (1.0, 1.0, 1.0)
+
+
+def test_equal_confidences_count_together_so_that_their_order_changes_nothing():
+    detected, reference = sets_of(3)
+    for order in (slice(None), slice(None, None, -1)):
+        turned = rb.Footprints.of(detected[order], attributes={"confidence": np.ones(len(detected))})
+        values = rb.evaluate(turned, rb.Footprints.of(reference), evaluator="iou").values
+        assert values["ap.ap"] == pytest.approx(evaluate_with_ones(detected, reference))
+
+
+def evaluate_with_ones(detected, reference):
+    ones = rb.Footprints.of(detected, attributes={"confidence": np.ones(len(detected))})
+    return rb.evaluate(ones, rb.Footprints.of(reference), evaluator="iou").values["ap.ap"]
+
+
+def test_coco_leaves_out_a_detection_on_an_ignore_region_only_where_it_reaches_the_threshold():
+    reference = [house(0), house(50, 3, depth=3)]
+    detected = [house(0), house(50, 3, depth=3.2), house(52, 10)]
+    spacenet, coco = (
+        evaluate("iou", detected, reference, minimum_area=20.0, matching=matching) for matching in ("spacenet", "coco")
+    )
+    assert spacenet.tallies.counts.detected == 1, "whatever overlaps only a left-out reference is left out"
+    assert coco.tallies.counts.detected == 2, "the large one has an IoU below the threshold with it: a false positive"
+    assert (spacenet.values["iou.precision"], coco.values["iou.precision"]) == (1.0, 0.5)

@@ -36,3 +36,34 @@ def groups(detected, reference):
         free -= ds
         found.append((sorted(ds), sorted(rs)))
     return found
+
+
+def iou(one, two):
+    shared = overlap(one, two)
+    return round(min(shared / (one.area + two.area - shared), 1.0), 9)
+
+
+def greedy(detected, reference, confidence, threshold):
+    """Return {detection: reference}: by falling confidence, each takes the best remaining reference."""
+    best = [max((iou(one, two) for two in reference), default=0.0) for one in detected]
+    order = sorted(range(len(detected)), key=lambda d: (-(best if confidence is None else confidence)[d], -best[d]))
+    matches, free = {}, set(range(len(reference)))
+    for d in order:
+        found = [(iou(detected[d], reference[r]), -r) for r in free]
+        found = [pair for pair in found if pair[0] >= threshold and overlap(detected[d], reference[-pair[1]])]
+        if found:
+            matches[d] = -max(found)[1]
+            free.remove(matches[d])
+    return matches
+
+
+def average_precision(true, references):
+    """Return AP of detections in order of falling confidence, all different: precision at 101 recalls, monotonic."""
+    points, found = [], 0
+    for number, hit in enumerate(true, start=1):
+        found += hit
+        points.append((found / references, found / number))
+    total = 0.0
+    for place in range(101):
+        total += max((precision for recall, precision in points if recall >= place / 100 - 1e-12), default=0.0)
+    return total / 101

@@ -1,0 +1,372 @@
+"""The evaluator ``iou``: precision, recall and F1 at an IoU threshold, average precision, panoptic quality.
+
+Matching is greedy: detections by falling confidence (without confidences by falling best IoU), each takes the remaining
+reference with the largest IoU of at least the threshold. This is the rule of SpaceNet (Van Etten, Lindenbaum & Bacastow
+2018) and of COCO (Lin et al. 2014, doi:10.1007/978-3-319-10602-1_48). With ``matching=coco`` references that are left
+out are ignore regions: a detection that matches nothing else and has the threshold's IoU with one of them is left out.
+
+Average precision follows COCO: IoU thresholds 0.50 to 0.95 in steps of 0.05, precision at 101 recall points, made
+monotonic; no cap on the number of objects. Detections of equal confidence count together, so that their order in the
+file changes nothing; with distinct confidences the value is COCO's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ..core.parameters import parameter
+from ..scenes.geodata.footprints import Footprints
+from ..scenes.geodata.raster import Grid
+from .average_precision import AP_THRESHOLDS, Ranking, average_precision
+from .base import Evaluation, Evaluator
+from .index import IndexGroup, index, ratio
+from .overlay.coverage import CountedSets, counted_sets
+from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
+from .overlay.greedy import accept_in_order
+from .overlay.left_out import Counted, LeftOut, left_out_notes, repair_notes
+from .overlay.overlaps import overlaps_between
+from .tally import Tallies
+from .verdict_table import Measure, Verdicts
+
+__all__ = ["APIndices", "IoU", "IoUIndices", "PanopticIndices"]
+
+_COCO = "Lin et al. 2014 (COCO)"
+_SPACENET = "Van Etten, Lindenbaum & Bacastow 2018 (SpaceNet)"
+_PANOPTIC = "Kirillov et al. 2019"
+#: How far the threshold is moved to find the objects that its choice decides.
+_SHIFT = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Counts(Tallies):
+    detected: int = 0
+    reference: int = 0
+    true_positives: int = 0
+    false_positives: int = 0
+    false_negatives: int = 0
+    flipped: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Panoptic(Tallies):
+    pairs: int = 0
+    sum_iou: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Tallies(Tallies):
+    counts: _Counts = field(default_factory=_Counts)
+    panoptic: _Panoptic = field(default_factory=_Panoptic)
+    left_out: LeftOut = field(default_factory=LeftOut)
+    ranking: Ranking = field(default_factory=Ranking)
+
+
+def _f1(t: _Tallies) -> float | None:
+    counts = t.counts
+    return ratio(2 * counts.true_positives, 2 * counts.true_positives + counts.false_positives + counts.false_negatives)
+
+
+@dataclass(frozen=True, kw_only=True)
+class IoUIndices(IndexGroup):
+    """Rates at the threshold; None where undefined."""
+
+    key = "iou"
+    title = "at the threshold"
+
+    precision: float | None = index(
+        "precision",
+        "higher",
+        "fraction",
+        lambda t: ratio(t.counts.true_positives, t.counts.detected),
+        symbol="P",
+        meaning="TP/(TP+FP)",
+        source=_SPACENET,
+    )
+    recall: float | None = index(
+        "recall",
+        "higher",
+        "fraction",
+        lambda t: ratio(t.counts.true_positives, t.counts.reference),
+        symbol="R",
+        meaning="TP/(TP+FN)",
+        source=_SPACENET,
+    )
+    f1: float | None = index(
+        "F1", "higher", "fraction", _f1, symbol="F1", meaning="2 TP/(2 TP+FP+FN)", source=_SPACENET
+    )
+    flipped: float | None = index(
+        "objects that the threshold decides",
+        "lower",
+        "fraction",
+        lambda t: ratio(t.counts.flipped, t.counts.detected + t.counts.reference),
+        symbol="Flip",
+        meaning="objects whose verdict changes when the threshold moves by 0.05 up or down, of all objects",
+    )
+
+
+def _precision_at(t: _Tallies, place: int) -> float | None:
+    hits = (t.ranking.hits >> place) & 1 == 1
+    return average_precision(t.ranking.scores, hits, t.counts.reference)
+
+
+def _mean_precision(t: _Tallies) -> float | None:
+    values = [_precision_at(t, place) for place in range(len(AP_THRESHOLDS))]
+    return None if None in values else float(np.mean([value for value in values if value is not None]))
+
+
+def _mean_recall(t: _Tallies) -> float | None:
+    hits = [int(((t.ranking.hits >> place) & 1).sum()) for place in range(len(AP_THRESHOLDS))]
+    return ratio(float(np.mean(hits)), t.counts.reference)
+
+
+@dataclass(frozen=True, kw_only=True)
+class APIndices(IndexGroup):
+    """Average precision and recall over IoU thresholds; None without references."""
+
+    key = "ap"
+    title = "over thresholds"
+
+    ap: float | None = index(
+        "average precision",
+        "higher",
+        "fraction",
+        _mean_precision,
+        symbol="AP",
+        meaning="mean of AP over IoU thresholds 0.50 to 0.95",
+        source=_COCO,
+    )
+    ap_50: float | None = index(
+        "average precision at 0.5",
+        "higher",
+        "fraction",
+        lambda t: _precision_at(t, 0),
+        symbol="AP_50",
+        meaning="mean precision at 101 recall points, IoU threshold 0.5",
+        source=_COCO,
+    )
+    ap_75: float | None = index(
+        "average precision at 0.75",
+        "higher",
+        "fraction",
+        lambda t: _precision_at(t, 5),
+        symbol="AP_75",
+        meaning="mean precision at 101 recall points, IoU threshold 0.75",
+        source=_COCO,
+    )
+    ar: float | None = index(
+        "average recall",
+        "higher",
+        "fraction",
+        _mean_recall,
+        symbol="AR",
+        meaning="mean recall over IoU thresholds 0.50 to 0.95",
+        source=_COCO,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PanopticIndices(IndexGroup):
+    """Panoptic quality; None where there is no object."""
+
+    key = "panoptic"
+    title = "panoptic"
+
+    quality: float | None = index(
+        "panoptic quality",
+        "higher",
+        "fraction",
+        lambda t: ratio(t.panoptic.sum_iou, (t.counts.detected + t.counts.reference) / 2),
+        symbol="PQ",
+        meaning="sum of IoU over pairs above 0.5 / (TP + FP/2 + FN/2)",
+        source=_PANOPTIC,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """Overlapping pairs in the order in which they are accepted.
+
+    Attributes
+    ----------
+    detection, reference : ndarray of int64, shape (n,)
+    iou : ndarray, shape (n,)
+    counts : tuple of int
+        Number of detections and of references.
+    scores : ndarray, shape (number of detections,)
+        Confidence, or best IoU.
+    """
+
+    detection: NDArray[np.int64]
+    reference: NDArray[np.int64]
+    iou: NDArray[np.float64]
+    counts: tuple[int, int]
+    scores: NDArray[np.float64]
+
+    def match(self, threshold: float, *, above: bool = False) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the partners at a threshold: pairs of at least (or only above) that IoU."""
+        kept = self.iou > threshold if above else self.iou >= threshold
+        return accept_in_order(self.detection[kept], self.reference[kept], self.counts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class IoU(Evaluator):
+    """Greedy matching by IoU: precision, recall, F1, AP, AR and panoptic quality (SpaceNet, COCO)."""
+
+    name: ClassVar[str] = "iou"
+    groups = (IoUIndices, APIndices, PanopticIndices)
+    tallies_type = _Tallies
+    ranked_by: ClassVar[str] = "iou.f1"
+    gated_by: ClassVar[tuple[str, ...]] = ("iou.precision", "iou.recall", "ap.ap", "panoptic.quality")
+    swept_by: ClassVar[tuple[str, ...]] = ("iou.f1", "ap.ap")
+    verdict_kinds = coverage_kinds(
+        correct=("TP", "matched detection"), excess=("FP", "unmatched detection"), missing=("FN", "unmatched reference")
+    )
+    measures = (
+        Measure(key="iou", title="IoU", unit="fraction"),
+        Measure(key="confidence", title="confidence", unit="ratio"),
+    )
+
+    threshold: float = parameter(0.5, minimum=0.01, maximum=1.0, doc="least IoU of a match", source="SpaceNet, COCO")
+    matching: Literal["spacenet", "coco"] = parameter(
+        "spacenet",
+        choices=("spacenet", "coco"),
+        doc="coco: left-out references are ignore regions at the threshold; spacenet: by any overlap",
+    )
+    confidence: str = parameter("confidence", doc="attribute of the detections that ranks them, where they have it")
+    minimum_area: float = parameter(
+        0.0, unit="m2", minimum=0.0, doc="smaller references do not count, nor do detections on them"
+    )
+
+    def evaluate(
+        self,
+        detected: Footprints,
+        reference: Footprints,
+        *,
+        area: shapely.Geometry | None = None,
+        grid: Grid | None = None,
+    ) -> Evaluation:
+        """Compare two sets; see `Evaluator.evaluate`."""
+        sets = counted_sets(detected, reference, area=area, minimum_area=self.minimum_area)
+        if self.matching == "coco":
+            sets = self._with_ignore_regions(sets)
+        candidates = self._candidates(sets)
+        d, r = sets.detections.mask, sets.references.mask
+        of_detection, of_reference = candidates.match(self.threshold)
+        flipped = np.zeros(2, dtype=np.int64)
+        moved = [candidates.match(self.threshold + shift) for shift in (-_SHIFT, _SHIFT)]
+        for side, (mask, now) in enumerate(((d, of_detection), (r, of_reference))):
+            changed = [(partners[side] >= 0) != (now >= 0) for partners in moved]
+            flipped[side] = (np.logical_or(*changed) & mask).sum()
+        hits = np.zeros(len(detected), dtype=np.int64)
+        for place, threshold in enumerate(AP_THRESHOLDS.tolist()):
+            hits |= (candidates.match(threshold)[0] >= 0).astype(np.int64) << place
+        matched = int((of_detection >= 0).sum())
+        panoptic = candidates.match(0.5, above=True)[0]
+        pair_iou = candidates.iou[(candidates.iou > 0.5) & (panoptic[candidates.detection] == candidates.reference)]
+        tallies = _Tallies(
+            counts=_Counts(
+                detected=int(d.sum()),
+                reference=int(r.sum()),
+                true_positives=matched,
+                false_positives=int(d.sum()) - matched,
+                false_negatives=int(r.sum()) - matched,
+                flipped=int(flipped.sum()),
+            ),
+            panoptic=_Panoptic(pairs=len(pair_iou), sum_iou=float(pair_iou.sum())),
+            left_out=sets.left_out,
+            ranking=Ranking(candidates.scores[d], hits[d]),
+        )
+        return self.summarise(
+            tallies,
+            list(repair_notes(detected, reference)),
+            find_verdicts=lambda: self._verdicts(sets, candidates, of_detection, of_reference),
+        )
+
+    def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:
+        """Return how many objects were left out."""
+        return tuple(left_out_notes(tallies.left_out))
+
+    def _with_ignore_regions(self, sets: CountedSets) -> CountedSets:
+        """Leave out detections by their IoU with left-out references, instead of by any overlap with them."""
+        pairs = overlaps_between(sets.detected, sets.reference).only_significant
+        pairs = pairs.where(~sets.references.mask[pairs.second])
+        united = sets.detected.areas[pairs.first] + sets.reference.areas[pairs.second] - pairs.area
+        ignored = np.zeros(len(sets.detected), dtype=bool)
+        ignored[pairs.first[pairs.area / united >= self.threshold]] = True
+        matched = np.zeros(len(sets.detected), dtype=bool)
+        overlaps = sets.overlaps
+        iou = overlaps.area / (
+            sets.detected.areas[overlaps.first] + sets.reference.areas[overlaps.second] - overlaps.area
+        )
+        matched[overlaps.first[iou >= self.threshold]] = True
+        code = np.where(sets.detections.code == 1, 1, np.where(ignored & ~matched, 3, 0)).astype(np.int8)
+        return CountedSets(
+            detected=sets.detected,
+            reference=sets.reference,
+            detections=Counted(code),
+            references=sets.references,
+            overlaps=overlaps.where(code[overlaps.first] == 0),
+        )
+
+    def _candidates(self, sets: CountedSets) -> _Candidates:
+        detected, reference, overlaps = sets.detected, sets.reference, sets.overlaps
+        united = detected.areas[overlaps.first] + reference.areas[overlaps.second] - overlaps.area
+        # Rounded, so that rounding in coordinates of millions of metres decides nothing.
+        iou = np.asarray(np.round(np.minimum(overlaps.area / united, 1.0), 9), dtype=np.float64)
+        best: NDArray[np.float64] = np.zeros(len(detected))
+        np.maximum.at(best, overlaps.first, iou)
+        given = detected.attributes.get(self.confidence)
+        scores: NDArray[np.float64] = best if given is None else _numbers(given)
+        x, y = np.round(detected.centres, 3).T
+        rank = np.empty(len(detected), dtype=np.int64)
+        rank[np.lexsort((y, x, -best, -scores))] = np.arange(len(detected))
+        order = np.lexsort((overlaps.second, -iou, rank[overlaps.first]))
+        return _Candidates(
+            overlaps.first[order],
+            overlaps.second[order],
+            iou[order],
+            (len(detected), len(reference)),
+            scores,
+        )
+
+    def _verdicts(
+        self,
+        sets: CountedSets,
+        candidates: _Candidates,
+        of_detection: NDArray[np.int64],
+        of_reference: NDArray[np.int64],
+    ) -> Verdicts:
+        sides = []
+        for own, partner, rows in (
+            (sets.detected, of_detection, candidates.detection),
+            (sets.reference, of_reference, candidates.reference),
+        ):
+            best = np.zeros(len(own))
+            np.maximum.at(best, rows, candidates.iou)
+            words = "matched" if own is sets.detected else "found"
+            sides.append(
+                SideVerdicts(
+                    partner >= 0,
+                    [
+                        f"{words}: best IoU {value:.2f}" if row >= 0 else f"not {words}: best IoU {value:.2f}"
+                        for row, value in zip(partner.tolist(), best.tolist(), strict=True)
+                    ],
+                    {
+                        "iou": best,
+                        "confidence": candidates.scores if own is sets.detected else np.full(len(own), np.nan),
+                    },
+                    partner,
+                )
+            )
+        return coverage_verdicts(sets, self.verdict_kinds, self.measures, detections=sides[0], references=sides[1])
+
+
+def _numbers(column: NDArray[Any]) -> NDArray[np.float64]:
+    """Return an attribute as numbers; what is missing ranks last."""
+    values: NDArray[np.float64] = np.ma.filled(np.ma.masked_invalid(np.ma.asarray(column, dtype=np.float64)), -1e308)
+    return values
