@@ -22,7 +22,7 @@ _CHECKSUM = 32  # bytes of a SHA-256
 _DAY = 86_400.0
 #: Entries that were not used for this time are removed, s.
 _OLDEST = 30 * _DAY
-#: Size that a cleaned folder does not exceed, bytes. All kernels of one state of the code need some 30 MB.
+#: Size that a cleaned folder does not exceed, bytes. The kernels of `mpp` and the line detectors take 16 MB.
 _LARGEST = 512_000_000
 
 
