@@ -16,7 +16,13 @@ from .options import DetectorOption, EvaluatorsOption, OverwriteOption, ScenesOp
 
 __all__ = ["app", "save"]
 
-app = typer.Typer(name="baseline", help="Save reference scores for the regression gate.", no_args_is_help=True)
+app = typer.Typer(
+    name="baseline",
+    help="Save reference scores for the regression gate.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+)
 
 
 @app.callback()

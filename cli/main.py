@@ -1,8 +1,8 @@
 """The command ``roofbench``: its commands, exit codes and how errors are reported.
 
 Exit codes: 0 good; 1 regression; 2 usage or bad input; 3 some runs failed; 4 nothing measured or not comparable.
-Data goes to standard output, messages and progress to standard error. Modules of the commands import what they need
-when they run, so that ``roofbench evaluate`` does not wait for libraries that it does not use.
+Data goes to standard output, messages and progress to standard error. Commands are imported when they are called
+(`lazy_group`), and import what they need when they run, so that none waits for libraries that it does not use.
 """
 
 from __future__ import annotations
@@ -14,22 +14,7 @@ from typing import Annotated
 import typer
 
 from ..core.errors import RoofbenchError
-from . import baseline, plot, scenes
-from .check_plugin import check_plugin
-from .command import Command
-from .detect import detect
-from .evaluate import evaluate
-from .export import export
-from .gate import gate
-from .info import info
-from .list import list_names
-from .ls import ls
-from .new import new
-from .report import report
-from .run import run
-from .score import score
-from .sweep import sweep
-from .why import why
+from .lazy_group import LazyGroup
 
 __all__ = ["app", "main"]
 
@@ -38,6 +23,7 @@ _INTERRUPTED = 130
 
 app = typer.Typer(
     name="roofbench",
+    cls=LazyGroup,
     help="Evaluation-first benchmark for building detection from airborne LiDAR and orthoimagery.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -46,23 +32,6 @@ app = typer.Typer(
     # Inherited by every command.
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("run", cls=Command)(run)
-app.command("evaluate", cls=Command)(evaluate)
-app.command("detect", cls=Command)(detect)
-app.command("sweep", cls=Command)(sweep)
-app.command("report", cls=Command)(report)
-app.add_typer(plot.app)
-app.add_typer(scenes.app)
-app.add_typer(baseline.app)
-app.command("gate", cls=Command)(gate)
-app.command("list", cls=Command)(list_names)
-app.command("info", cls=Command)(info)
-app.command("new", cls=Command)(new)
-app.command("ls", cls=Command)(ls)
-app.command("why", cls=Command)(why)
-app.command("score", cls=Command)(score)
-app.command("export", cls=Command)(export)
-app.command("check-plugin", cls=Command)(check_plugin)
 
 
 def _version(asked: bool) -> None:

@@ -13,7 +13,6 @@ from typing import Annotated, NamedTuple
 import typer
 
 from ..core.errors import ParameterError
-from ..core.registry import parse_assignment
 from . import completion
 
 __all__ = [
@@ -68,6 +67,8 @@ class Assignment(NamedTuple):
 
 def read_assignment(text: str) -> Assignment:
     """Read ``NAME=VALUE``."""
+    from ..core.registry import parse_assignment  # here, since help has no use for registries
+
     try:
         return Assignment(*parse_assignment(text))
     except ParameterError as error:

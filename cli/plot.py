@@ -11,7 +11,13 @@ from .plot_sweep import plot_sweep
 
 __all__ = ["app"]
 
-app = typer.Typer(name="plot", help="Draw single figures as PNG, SVG or PDF.", no_args_is_help=True)
+app = typer.Typer(
+    name="plot",
+    help="Draw single figures as PNG, SVG or PDF.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+)
 app.command("sweep", cls=Command)(plot_sweep)
 app.command("scene", cls=Command)(plot_scene)
 app.command("gate", cls=Command)(plot_gate)

@@ -13,7 +13,13 @@ from .scenes_show import show
 
 __all__ = ["app"]
 
-app = typer.Typer(name="scenes", help="Make, import, check, list and show scenes.", no_args_is_help=True)
+app = typer.Typer(
+    name="scenes",
+    help="Make, import, check, list and show scenes.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+)
 app.command("import", cls=Command)(import_)
 app.command("make", cls=Command)(make)
 app.command("list", cls=Command)(list_scenes)

@@ -1,5 +1,8 @@
 """One grammar: an option has one name, one metavar and one meaning in every command, and every command has help."""
 
+import subprocess
+import sys
+
 import pytest
 import typer.main
 from harness.command_line import run
@@ -61,7 +64,10 @@ def test_options_mean_the_same_everywhere(words):
             assert option.is_flag
 
 
-@pytest.mark.parametrize("words", [(), *COMMANDS], ids=lambda words: " ".join(words) or "roofbench")
+GROUPS = [(), ("plot",), ("scenes",), ("baseline",)]
+
+
+@pytest.mark.parametrize("words", [*GROUPS, *COMMANDS], ids=lambda words: " ".join(words) or "roofbench")
 def test_help_is_written_for_people(words):
     code, short, _ = run(*words, "-h")
     assert code == 0
@@ -69,7 +75,7 @@ def test_help_is_written_for_people(words):
     assert short.startswith("Usage: roofbench")
     for technical in ("<", "[default: (", "INTEGER", "PATH", "list["):
         assert technical not in short
-    if words:
+    if words not in GROUPS:
         for parameter in COMMANDS[words].params:
             assert getattr(parameter, "help", ""), f"{parameter.name} has no help"
 
@@ -117,3 +123,20 @@ def test_no_message_of_the_library_names_an_option():
         if re.search(r"[\"' (]--[a-z]", line) and not allowed.search(line) and not line.lstrip().startswith("#")
     ]
     assert found == []
+
+
+def test_help_imports_no_command():
+    code = (
+        "import contextlib, sys\nfrom roofbench.cli.main import main\n"
+        "with contextlib.suppress(SystemExit): main()\nprint(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "--help"], capture_output=True, text=True, check=True)
+    loaded = done.stdout.splitlines()[-1].split()
+    assert "roofbench.cli.lazy_group" in loaded
+    assert not {"numpy", "shapely", "roofbench.cli.run", "roofbench.core.registry"} & set(loaded)
+
+
+def test_a_mistyped_command_is_answered_with_the_nearest():
+    code, _, err = run("evalute")
+    assert code == 2
+    assert "Did you mean 'evaluate'?" in err
