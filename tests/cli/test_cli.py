@@ -115,7 +115,7 @@ def test_detect_writes_what_a_run_stores(cli, misbehaving):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("run", "nosuch.toml"), "nosuch.toml: no such suite file"),
+        (("run", "nosuch.toml"), "nosuch.toml: no such file"),
         (("run", "nosuch"), "is no scene folder, preset or suite"),
         (("run", "hamlet", "-d", "ndms"), "did you mean 'ndsm'"),
         (("run", "hamlet", "-j", 0, "--time-limit", 3), "limits need a worker process"),

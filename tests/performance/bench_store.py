@@ -79,7 +79,7 @@ def main():
             "-n 0 -f csv",
             "-n 0 -f json",
             "-n 0 --status failed",
-            "-n 0 -d ndsm[[]height=7?]",
+            "-n 0 --detectors ndsm[[]height=7?]",
             "-n 0 --scenes hamlet-1?",
             "--status failed --scenes hamlet-1*",
         ):
