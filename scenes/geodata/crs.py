@@ -7,6 +7,8 @@ of its axes, so evaluation and detection accept only projected systems in metres
 from __future__ import annotations
 
 import math
+import re
+import warnings
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -19,6 +21,7 @@ __all__ = [
     "common_crs",
     "crs_label",
     "crs_text",
+    "file_crs",
     "named_crs",
     "parse_crs",
     "require_metric",
@@ -54,16 +57,72 @@ def crs_label(text: str | None) -> str:
         return "no CRS"
     if text.upper().startswith("EPSG:"):
         return text.upper()
-    crs = parse_crs(text)
-    authority = crs.to_authority(min_confidence=60)
-    return ":".join(authority) if authority else str(crs.name)
+    authority = _likely_authority(text)
+    return ":".join(authority) if authority else str(parse_crs(text).name)
 
 
 def crs_text(crs: CRS) -> str:
     """Return the text by which roofbench keeps the horizontal part: ``EPSG:28992`` where there is a code, else WKT."""
     horizontal = _horizontal(crs.to_wkt())
-    authority = horizontal.to_authority(min_confidence=100)
-    return ":".join(authority) if authority else str(horizontal.to_wkt())
+    text = str(horizontal.to_wkt())
+    authority = horizontal.to_authority(min_confidence=100) or _authority(text)
+    return ":".join(authority) if authority else text
+
+
+def file_crs(crs: CRS) -> str | None:
+    """Return the text of the CRS of a file; None for a local or undefined system, which does not locate anything."""
+    return None if _horizontal(crs.to_wkt()).is_engineering else crs_text(crs)
+
+
+@lru_cache(maxsize=64)
+def _authority(text: str) -> tuple[str, str] | None:
+    """Return the registered system that a CRS is by its parameters; None when there is none.
+
+    PROJ compares the order of the axes, too, which WKT 1 does not keep: northing before easting, as the register has
+    it for New Zealand, Poland or Japan, comes back as easting before northing.
+    """
+    import pyproj
+    from pyproj.exceptions import CRSError as ProjError
+
+    crs = _horizontal(text)
+    root = crs.to_json_dict().get("id")
+    codes = [(str(root["authority"]), str(root["code"]))] if root else []
+    codes += [(match.auth_name, match.code) for match in crs.list_authority(min_confidence=20)]
+    for authority, code in codes:
+        try:
+            registered = pyproj.CRS.from_authority(authority, code)
+        except ProjError:
+            continue
+        if _same_projection(registered, crs):
+            return authority, code
+    return None
+
+
+def _likely_authority(text: str) -> tuple[str, str] | None:
+    """Return the registered system that a CRS is, or that PROJ finds similar."""
+    crs = parse_crs(text)
+    return crs.to_authority(min_confidence=100) or _authority(text) or crs.to_authority(min_confidence=60)
+
+
+def _same_projection(one: CRS, two: CRS) -> bool:
+    """Return whether two projected systems have the same datum, method and parameters, in any order of axes."""
+    if not (one.is_projected and two.is_projected):
+        return False
+    from pyproj.exceptions import CRSError as ProjError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # PROJ strings lose the names, which are compared besides
+            parameters = one.to_dict(), two.to_dict()
+    except ProjError:  # a method that PROJ does not have
+        return False
+    return bool(parameters[0]) and parameters[0] == parameters[1] and _datum_name(one) == _datum_name(two)
+
+
+def _datum_name(crs: CRS) -> str:
+    """Return the name of the datum without the marks that dialects of WKT add."""
+    name = crs.datum.name if crs.datum is not None else ""
+    return re.sub(r"[^a-z0-9]", "", name.lower().removeprefix("d_").removesuffix("ensemble"))
 
 
 @lru_cache(maxsize=64)
@@ -76,15 +135,25 @@ def _horizontal(text: str) -> CRS:
 
 
 @lru_cache(maxsize=64)
-def _usable(text: str) -> bool:
-    """Return whether PROJ can compute with a system; a family such as "UTM, north" cannot."""
+def _unusable(text: str) -> str | None:
+    """Return why coordinates of a system are neither degrees nor on a map; None when they are."""
     import pyproj
+    from pyproj.exceptions import CRSError as ProjError
 
+    crs = _horizontal(text)
+    if crs.is_geocentric:
+        return "is geocentric (measured from the centre of the earth), a projected system is needed"
+    if crs.is_vertical:
+        return "is a system of heights alone, a projected system is needed"
+    if crs.is_engineering:
+        return "is a local system, which does not say where on earth the coordinates are"
+    if crs.is_geographic:
+        return None
     try:
-        pyproj.Proj(_horizontal(text))
-    except pyproj.exceptions.ProjError:
-        return False
-    return True
+        pyproj.Proj(crs)
+    except ProjError:
+        return "is not a projected system that PROJ can compute with"
+    return None if crs.is_projected else "is not a projected system"
 
 
 #: How files of other kinds than points get another CRS.
@@ -92,7 +161,7 @@ _REPROJECT = "reproject it, for instance with ogr2ogr -t_srs or gdalwarp -t_srs"
 
 
 def require_metric(text: str | None, where: str, *, heights: bool = True, remedy: str | None = None) -> None:
-    """Raise `CRSError` unless the CRS is projected, with axes (and heights, if it names them) in metres.
+    """Raise `CRSError` unless the CRS is a map projection, with axes (and heights, if it names them) in metres.
 
     None (not known) passes.
 
@@ -110,15 +179,13 @@ def require_metric(text: str | None, where: str, *, heights: bool = True, remedy
     if text is None:
         return
     crs = _horizontal(text)
+    reason = _unusable(text)
+    if reason is not None:
+        raise CRSError(f"{where}: {crs_label(text)} {reason}: {remedy or _REPROJECT + ', or set its true CRS by crs='}")
     if crs.is_geographic:
         raise CRSError(
             f"{where}: {crs_label(text)} is geographic (degrees), areas and distances need metres: "
             f"{remedy or _REPROJECT + ', or set its true CRS by crs='}"
-        )
-    if not crs.is_projected or not _usable(text):
-        raise CRSError(
-            f"{where}: {crs_label(text)} ({crs.name}) is not a projected system with coordinates in metres: "
-            f"{remedy or 'set its true CRS by crs='}"
         )
     unit = crs.axis_info[0] if crs.axis_info else None
     if unit is not None and abs(unit.unit_conversion_factor - 1.0) > 1e-9:
@@ -162,8 +229,8 @@ def same_crs(first: str, second: str) -> bool:
     one, two = _horizontal(first), _horizontal(second)
     if one.equals(two, ignore_axis_order=True):
         return True
-    code = one.to_authority(min_confidence=60)
-    return code is not None and code == two.to_authority(min_confidence=60)
+    code = _likely_authority(str(one.to_wkt()))
+    return code is not None and code == _likely_authority(str(two.to_wkt()))
 
 
 def common_crs(first: str | None, second: str | None, names: tuple[str, str]) -> str | None:

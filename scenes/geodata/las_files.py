@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError, OutputError
 from ...core.inputs import require_file
-from .crs import crs_text, parse_crs, require_metric
+from .crs import file_crs, parse_crs, require_metric
 from .points import PointCloud
 
 __all__ = ["LasHeader", "read_las_header", "read_points", "write_points"]
@@ -362,8 +362,10 @@ def _header_crs(file: Path, header: Any) -> str | None:
         raise CRSError(f"{file}: its CRS record cannot be read ({error}): name the CRS by crs=") from error
     if crs is None:
         return None
-    require_metric(crs.to_wkt(), str(file), remedy=_REPROJECT)
-    return crs_text(crs)
+    text = file_crs(crs)
+    if text is not None:
+        require_metric(crs.to_wkt(), str(file), remedy=_REPROJECT)
+    return text
 
 
 def _refuse_feet(file: Path, header: Any) -> None:

@@ -22,13 +22,15 @@ from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError
 from ...core.inputs import require_file
-from .crs import crs_text
+from .crs import file_crs
 from .raster import Elevation, Grid, Image
 
 __all__ = [
     "BANDS",
     "RasterHeader",
+    "assumed_bands",
     "band_names",
+    "data_mask",
     "is_opaque",
     "looks_like_values",
     "opened",
@@ -60,6 +62,8 @@ class RasterHeader:
         Without an alpha band.
     band_names : tuple of str
         Descriptions of the bands; empty texts where there are none.
+    colours : tuple of str
+        What each band shows by the colour interpretation of the file: ``red``, ``undefined``, ...
     dtype : str
         ``"uint8"``.
     square : bool
@@ -77,6 +81,7 @@ class RasterHeader:
     grid: Grid
     band_count: int
     band_names: tuple[str, ...]
+    colours: tuple[str, ...]
     dtype: str
     square: bool
     height_unit: str | None
@@ -136,6 +141,7 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
             grid=grid,
             band_count=count,
             band_names=tuple((text or "").lower() for text in source.descriptions[:count]),
+            colours=tuple(colour.name for colour in colours if colour.name != "alpha"),
             dtype=source.dtypes[0],
             square=abs(a + e) <= 1e-6 * a,
             height_unit=_height_unit(source),
@@ -161,8 +167,8 @@ def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = No
     with opened(header.path, opaque=is_opaque(header, names)) as source:
         indexes, kept = _band_indexes(names)
         values = source.read(indexes)
-        valid = _valid(source)
-    return Image(values, kept, header.grid, valid)
+        valid = data_mask(source)
+    return Image(values, kept, header.grid, None if valid.all() else valid)
 
 
 def read_elevation(path: str | os.PathLike[str]) -> Elevation:
@@ -193,12 +199,34 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
         return tuple(bands)
     if all(name in BANDS for name in header.band_names) and len(set(header.band_names)) == header.band_count:
         return header.band_names
+    by_colour = _names_by_colour(header.colours)
+    if by_colour is not None:
+        return by_colour
     if header.band_count not in _DEFAULT_BANDS:
         raise InputError(
             f"{header.path} has {header.band_count} bands, expected 1 (grey), 3 (red, green, blue) or 4 (and nir): "
             "name them by bands=, - to skip one"
         )
     return _DEFAULT_BANDS[header.band_count]
+
+
+def _names_by_colour(colours: Sequence[str]) -> tuple[str, ...] | None:
+    """Return names by colour interpretation, a fourth band of no colour as near infrared; None when they do not do."""
+    names = tuple({"gray": "grey", "undefined": "nir"}.get(colour, colour) for colour in colours)
+    return names if sorted(names) in (["blue", "green", "red"], ["blue", "green", "nir", "red"]) else None
+
+
+def assumed_bands(header: RasterHeader, bands: Sequence[str] | None) -> str | None:
+    """Return a note on names of bands that the file does not give; None when it gives all of them."""
+    names = band_names(header, bands)
+    if bands is not None or names == header.band_names or len(names) == 1:
+        return None
+    if _names_by_colour(header.colours) is None:
+        return f"{header.path.name} does not name its bands: they were taken for {', '.join(names)}"
+    unnamed = [name for name, colour in zip(names, header.colours, strict=True) if name != colour]
+    if unnamed:
+        return f"{header.path.name} does not name band {names.index('nir') + 1}: it was taken for near infrared"
+    return None
 
 
 def is_opaque(header: RasterHeader, names: Sequence[str]) -> bool:
@@ -317,7 +345,7 @@ def _source_crs(file: Path, source: Any) -> str | None:
         crs = CRS.from_wkt(source.crs.to_wkt())
     except ProjError as error:
         raise CRSError(f"{file}: its CRS cannot be read ({error}): set it with gdal_edit.py -a_srs") from error
-    return crs_text(crs)
+    return file_crs(crs)
 
 
 def _square(header: RasterHeader) -> RasterHeader:
@@ -359,7 +387,12 @@ def require_image_type(header: RasterHeader) -> None:
         )
 
 
-def _valid(source: Any) -> NDArray[np.bool_] | None:
-    """Return where the image has data; None when everywhere."""
-    mask = source.dataset_mask() > 0
-    return None if mask.all() else mask
+def data_mask(source: Any) -> NDArray[np.bool_]:
+    """Return where a raster has data, shape (rows, columns): by its alpha band, else by its mask or no-data values.
+
+    GDAL itself regards an alpha band only beside one or three bands of whole numbers.
+    """
+    alpha = [index for index, colour in enumerate(source.colorinterp, start=1) if colour.name == "alpha"]
+    if alpha:
+        return np.asarray(source.read(alpha[-1]) > 0)
+    return np.asarray(source.dataset_mask() > 0)

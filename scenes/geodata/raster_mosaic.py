@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...core.errors import CRSError, InputError
 from .crs import crs_label, same_crs
 from .raster import Elevation, Grid, Image
-from .raster_files import RasterHeader, band_names, is_opaque, opened, require_image_type
+from .raster_files import RasterHeader, band_names, data_mask, is_opaque, opened, require_image_type
 
 __all__ = ["mosaic_elevation", "mosaic_image", "resampling_note", "warped_extent", "warped_size"]
 
@@ -129,7 +129,7 @@ def _warped(
                 add_alpha=source.nodata is None and not _has_alpha(source),
             ) as view:
                 block = view.read(indexes)
-                has_data = view.dataset_mask() > 0
+                has_data = data_mask(view)
             yield slice(start, stop), columns, block, has_data
 
 

@@ -22,7 +22,7 @@ from ...core.errors import CRSError, InputError, OutputError
 from ...core.inputs import require_file
 from ...core.output import whole_file
 from ...core.registry import nearest_hint
-from .crs import common_crs, crs_label, crs_text, named_crs, parse_crs, require_metric, same_crs
+from .crs import common_crs, crs_label, file_crs, named_crs, parse_crs, require_metric, same_crs
 from .footprints import Footprints, Repair
 from .vector_columns import storable_columns
 
@@ -243,7 +243,13 @@ def _read_ogr(
     if file.suffix.lower() == ".shp" and "building_i" in columns:
         columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name
     geometries, closed = _geometries(wkb)
-    return geometries, columns, meta["crs"], closed
+    crs = None if meta["crs"] is None else _named_or_none(meta["crs"])
+    return geometries, columns, crs, closed
+
+
+def _named_or_none(crs: str) -> str | None:
+    """Return the CRS of a file as it is; None for a local or undefined one."""
+    return crs if crs.upper().startswith("EPSG:") else crs if file_crs(parse_crs(crs)) is not None else None
 
 
 def _geometries(wkb: NDArray[np.object_]) -> tuple[NDArray[np.object_], list[Repair]]:
@@ -280,7 +286,7 @@ def _read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[An
             if values.dtype.kind == "O":
                 values = np.where(frame[name].isna(), None, values)
             columns[str(name)] = values
-    return np.asarray(frame.geometry.array, dtype=object), columns, None if frame.crs is None else crs_text(frame.crs)
+    return np.asarray(frame.geometry.array, dtype=object), columns, None if frame.crs is None else file_crs(frame.crs)
 
 
 def _write_ogr(

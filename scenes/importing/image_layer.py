@@ -8,7 +8,7 @@ from pathlib import Path
 from ...core.errors import InputError
 from ..geodata.points import PointCloud
 from ..geodata.raster import Image
-from ..geodata.raster_files import RasterHeader, looks_like_values
+from ..geodata.raster_files import RasterHeader, assumed_bands, looks_like_values
 from ..geodata.raster_mosaic import mosaic_image
 from .place import Place, extent_text, file_names, file_paths
 from .raster_layer import check_size, grid_of, note_resampling
@@ -21,6 +21,10 @@ def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, ba
     grid = grid_of(place, images[0], gsd)
     check_size(place, grid.gsd, "gsd")
     note_resampling(place, images, grid)
+    for header in images:
+        sentence = assumed_bands(header, bands)
+        if sentence:
+            place.log.note(sentence)
     image = mosaic_image(images, grid, crs=place.crs, bands=bands)
     if bands is None and (marked := [header.path for header in images if looks_like_values(header)]):
         place.log.note(

@@ -6,6 +6,7 @@ from roofbench.scenes.geodata.crs import (
     common_crs,
     crs_label,
     crs_text,
+    file_crs,
     named_crs,
     require_metric,
     same_crs,
@@ -79,3 +80,39 @@ def test_systems_that_stretch_areas_are_warned_of():
     assert scale_warning("EPSG:28992", 84900, 447500) is None
     assert scale_warning("EPSG:25833", -1e12, 5.5e6) is None, "nothing is known so far away"
     assert scale_warning(None, 0.0, 0.0) is None
+
+
+LOCAL = 'LOCAL_CS["unnamed",UNIT["metre",1]]'
+
+
+@pytest.mark.parametrize("dialect", ["WKT1_GDAL", "WKT1_ESRI", "WKT2_2019"])
+@pytest.mark.parametrize("code", [2193, 2180, 3006, 2443, 5186, 2326, 3035, 31467, 31256, 25832, 28992, 2154])
+def test_a_system_is_known_again_by_its_own_wkt_in_any_order_of_axes(code, dialect):
+    text = pyproj.CRS.from_epsg(code).to_wkt(dialect)
+    assert same_crs(text, f"EPSG:{code}")
+    assert crs_text(pyproj.CRS.from_wkt(text)) == f"EPSG:{code}"
+    assert crs_label(text) == f"EPSG:{code}"
+
+
+def test_systems_that_differ_by_their_datum_alone_are_not_the_same():
+    for one, other in ((31467, 25832), (25832, 32632), (2180, 25834)):
+        assert not same_crs(pyproj.CRS.from_epsg(one).to_wkt("WKT1_GDAL"), f"EPSG:{other}")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("EPSG:4978", "geocentric"),
+        ("EPSG:5703", "heights alone"),
+        (LOCAL, "local system"),
+        ("EPSG:32600", "not a projected system"),
+    ],
+)
+def test_systems_that_are_no_map_are_refused_with_a_reason(text, reason):
+    with pytest.raises(CRSError, match=reason):
+        require_metric(text, "a.tif")
+
+
+def test_a_local_system_in_a_file_locates_nothing():
+    assert file_crs(pyproj.CRS.from_wkt(LOCAL)) is None
+    assert file_crs(pyproj.CRS.from_epsg(25832)) == "EPSG:25832"

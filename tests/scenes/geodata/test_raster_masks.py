@@ -1,0 +1,110 @@
+"""Where rasters have data, whatever their number of bands and types: masks, alpha, corners of turned images."""
+
+import numpy as np
+import pytest
+import rasterio
+from rasterio import Affine
+from rasterio.enums import ColorInterp
+from rasterio.warp import transform as transform_points
+
+from roofbench.scenes.geodata.raster import Grid
+from roofbench.scenes.geodata.raster_files import assumed_bands, band_names, read_image, read_raster_header
+from roofbench.scenes.geodata.raster_mosaic import mosaic_elevation, mosaic_image
+
+WEST, NORTH = 500000.0, 5500040.0
+GRID = Grid(WEST, NORTH, 0.5, 80, 80)
+LEVELS = (200, 100, 50, 220)
+
+
+def raster(path, *, levels=LEVELS, dtype="uint8", crs="EPSG:25832", corner=(WEST, NORTH), size=80, **more):
+    """Write bands of one value each; `mask` is True where there is data, `colours` their interpretation."""
+    mask, colours = more.get("mask"), more.get("colours")
+    profile = {"count": len(levels), "dtype": dtype, "width": size, "height": size, "crs": crs, "driver": "GTiff"}
+    transform = Affine(0.5, 0, corner[0], 0, -0.5, corner[1])
+    with (
+        rasterio.Env(GDAL_TIFF_INTERNAL_MASK=more.get("inside", True)),
+        rasterio.open(path, "w", transform=transform, photometric="MINISBLACK", **profile) as target,
+    ):
+        if colours:
+            target.colorinterp = [ColorInterp[colour] for colour in colours]
+        values = np.stack([np.full((size, size), level, dtype=dtype) for level in levels])
+        if mask is not None and not more.get("alpha"):
+            values *= mask.astype(dtype)
+        if more.get("alpha"):
+            values[-1] = np.where(mask, 255, 0)
+            values[:-1] *= mask.astype(dtype)
+        target.write(values)
+        if mask is not None and not more.get("alpha"):
+            target.write_mask(mask)
+    return read_raster_header(path)
+
+
+def upper_quarter_empty():
+    mask = np.ones((80, 80), dtype=bool)
+    mask[:20] = False
+    return mask
+
+
+@pytest.mark.parametrize("inside", [True, False], ids=["mask in the file", "mask beside it"])
+@pytest.mark.parametrize("levels", [LEVELS[:1], LEVELS[:3], LEVELS])
+def test_a_mask_is_honoured_with_any_number_of_bands(tmp_path, levels, inside):
+    header = raster(tmp_path / "a.tif", levels=levels, mask=upper_quarter_empty(), inside=inside)
+    for image in (read_image(header.path), mosaic_image([header], GRID, crs="EPSG:25832")):
+        assert (image.valid == upper_quarter_empty()).all()
+        assert [float(band[image.valid].mean()) for band in image.values] == list(levels)
+
+
+def test_alpha_beside_near_infrared_is_a_mask(tmp_path):
+    header = raster(
+        tmp_path / "a.tif",
+        levels=(*LEVELS, 0),
+        colours=("red", "green", "blue", "undefined", "alpha"),
+        alpha=True,
+        mask=upper_quarter_empty(),
+    )
+    assert header.band_count == 4
+    for image in (read_image(header.path), mosaic_image([header], GRID, crs="EPSG:25832")):
+        assert image.bands == ("red", "green", "blue", "nir")
+        assert (image.valid == upper_quarter_empty()).all()
+
+
+@pytest.mark.parametrize("levels", [LEVELS[:3], LEVELS])
+def test_corners_that_a_turned_image_leaves_have_no_data_and_are_filled_by_the_next_file(tmp_path, levels):
+    # The neighbouring zone is turned by some degrees against this one.
+    x, y = transform_points("EPSG:25832", "EPSG:25833", [WEST + 20], [NORTH - 20])
+    corner = (x[0] - 20, y[0] + 20)
+    turned = raster(tmp_path / "33.tif", levels=levels, crs="EPSG:25833", corner=corner)
+    alone = mosaic_image([turned], GRID, crs="EPSG:25832")
+    assert alone.valid is not None
+    assert 0.9 < alone.valid.mean() < 0.99
+    means = [float(band[alone.valid].mean()) for band in alone.values]
+    assert means == pytest.approx(levels, abs=1)
+    below = raster(tmp_path / "32.tif", levels=(90,) * len(levels))
+    both = mosaic_image([turned, below], GRID, crs="EPSG:25832")
+    assert both.valid is None
+    assert (both.values[:, ~alone.valid] == 90).all()
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64", "int16"])
+def test_corners_that_a_turned_dem_leaves_are_unknown(tmp_path, dtype):
+    x, y = transform_points("EPSG:25832", "EPSG:25833", [WEST + 20], [NORTH - 20])
+    header = raster(tmp_path / "d.tif", levels=(10,), dtype=dtype, crs="EPSG:25833", corner=(x[0] - 20, y[0] + 20))
+    values = mosaic_elevation([header], GRID, crs="EPSG:25832").values
+    assert 0.01 < np.isnan(values).mean() < 0.1
+    assert np.nanmin(values) == np.nanmax(values) == 10
+
+
+@pytest.mark.parametrize(
+    ("colours", "names", "note"),
+    [
+        (("blue", "green", "red"), ("blue", "green", "red"), None),
+        (("blue", "green", "red", "undefined"), ("blue", "green", "red", "nir"), "name band 4: it was taken for near"),
+        (("gray", "undefined", "undefined"), ("red", "green", "blue"), "taken for red, green, blue"),
+        (("gray", "undefined", "undefined", "undefined"), ("red", "green", "blue", "nir"), "taken for red, green"),
+    ],
+)
+def test_bands_are_named_by_the_colours_of_the_file_and_what_is_assumed_is_noted(tmp_path, colours, names, note):
+    header = raster(tmp_path / "a.tif", levels=LEVELS[: len(colours)], colours=colours)
+    assert band_names(header, None) == names
+    assert (note is None and assumed_bands(header, None) is None) or note in assumed_bands(header, None)
+    assert assumed_bands(header, names) is None
