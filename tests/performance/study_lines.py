@@ -329,6 +329,33 @@ def pictures(_seeds):
                 save(step_figure(step), f"lines-{name}.png")
 
 
+def modes(seeds, folders):
+    """Print every mode of both detectors on the papers' presets and on scene folders, by two matchings."""
+    columns = ("C_m", "C_r", "Q_l", "M_d", "Q_l overlap", "M_d overlap", "Q_lp")
+    print(f"| detector, area | {' | '.join(columns)} |\n|---|{'---|' * len(columns)}")
+    areas = {area: [scene_of(name, seed) for name in names for seed in seeds] for area, names in AREAS.items()}
+    areas |= {Path(folder).name: [rb.open_scene(folder)] for folder in folders}
+    for detector in ("original", "improved"):
+        for area, scenes in areas.items():
+            for mode in ("default", "paper", "program"):
+                rows = [of_matchings(scene, f"{detector}[mode={mode}]") for scene in scenes]
+                means = [statistics.fmean(column) for column in zip(*rows, strict=True)]
+                print(f"| {detector}, {mode}, {area} | {' | '.join(f'{value:.1f}' for value in means)} |", flush=True)
+
+
+def of_matchings(scene, selection):
+    found = rb.make_detector(selection).detect(scene.for_detection(), np.random.default_rng(0))
+    nearest, overlap = (
+        rb.evaluate(found, scene.reference, area=scene.area, matching=matching) for matching in ("nearest", "overlap")
+    )
+    one, two = nearest.object, overlap.object
+    shares = (
+        one.completeness, one.correctness, one.quality, one.multiple_detection_rate, two.quality,
+        two.multiple_detection_rate, nearest.pixel.quality,
+    )  # fmt: skip
+    return [100 * (share or 0.0) for share in shares]
+
+
 STUDIES = {
     "pattern": pattern,
     "losses": losses,
@@ -341,13 +368,16 @@ STUDIES = {
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("study", choices=("ablation", *STUDIES))
+    parser.add_argument("study", choices=("ablation", "modes", *STUDIES))
     parser.add_argument("--seeds", default="1,2,3")
     parser.add_argument("--detectors", default="original,improved")
+    parser.add_argument("--folders", nargs="*", default=[], help="scene folders besides the presets, for modes")
     options = parser.parse_args()
     seeds = [int(seed) for seed in options.seeds.split(",")]
     if options.study == "ablation":
         ablation(seeds, options.detectors.split(","))
+    elif options.study == "modes":
+        modes(seeds, options.folders)
     else:
         STUDIES[options.study](seeds)
 
