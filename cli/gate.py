@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ..core.errors import ParameterError, UnknownNameError
+from ..core.errors import InputError, ParameterError, UnknownNameError
 from .command import RunOptions, with_run_options
 from .console import messages
 from .measuring import measure_suite
@@ -101,6 +101,8 @@ def gate(
         if suite is not None or detector or time:
             raise ParameterError("a candidate file is measured already: leave out suite=, detector= and time=")
         after = Baseline.load(candidate)
+        if after == Baseline.load(baseline):
+            raise InputError(f"{candidate} has the same content as {baseline}: there is nothing to compare")
         after = after if scenes is None else after.with_scenes(scenes)
     else:
         if detector:

@@ -18,6 +18,7 @@ from ...core.errors import InputError, ParameterError, UnknownNameError
 from ...core.output import whole_file
 from ...core.registry import nearest_hint
 from ...evaluators.base import Evaluator
+from ..identity.detector_code import DetectorCode
 from ..identity.provenance import CodeVersion
 from ..identity.recipes import PluginRecipe, SceneRecipe
 from ..plan import KeyedEvaluator
@@ -49,11 +50,14 @@ class Measured:
     seeds : tuple of int
     runs : mapping of (scene, seed) to mapping or None
         Index values by key (None where undefined); None for a run that failed or was skipped.
+    code : DetectorCode, optional
+        The code that ran; None in baselines of version 0.1.
     """
 
     recipe: PluginRecipe
     seeds: tuple[int, ...]
     runs: Mapping[tuple[str, int], Mapping[str, float | None] | None]
+    code: DetectorCode | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,6 +161,8 @@ class Baseline:
                 for (scene, seed), values in sorted(measured.runs.items())
             ]
             facts = {**measured.recipe.to_dict(), "seeds": list(measured.seeds)}
+            if measured.code is not None:
+                facts["code"] = measured.code.to_dict()
             body = [f"      {json.dumps(name)}: {json.dumps(value)}," for name, value in facts.items()]
             listed = ",\n".join(runs)
             text = "\n".join([*body, f'      "runs": [\n{listed}\n      ]'])
@@ -203,6 +209,7 @@ class Baseline:
                 PluginRecipe(values["use"], values["parameters"]),
                 tuple(values["seeds"]),
                 {(scene, seed): found for scene, seed, found in values["runs"]},
+                DetectorCode.from_dict(values["code"]) if "code" in values else None,
             )
             for label, values in content["detectors"].items()
         }
@@ -235,7 +242,8 @@ def measure(
             if row.label == entry.label and row.scene in scenes:
                 found = values.get(row.id)
                 runs[row.scene, row.seed] = None if found is None else _rounded(found, keyed.evaluator)
-        detectors[entry.label] = Measured(PluginRecipe.of(entry.detector), entry.seeds, runs)
+        recipe, code = PluginRecipe.of(entry.detector), DetectorCode.of(entry.detector)
+        detectors[entry.label] = Measured(recipe, entry.seeds, runs, code)
     return Baseline(
         suite=suite.name,
         version=version,

@@ -33,6 +33,7 @@ __all__ = [
     "canonical",
     "digest",
     "module_closure",
+    "module_file",
     "random_stream_entropy",
     "source_closure",
 ]
@@ -85,7 +86,7 @@ def source_closure(plugin: type[Any]) -> SourceClosure:
     for base in plugin.__mro__:
         if base.__module__ in modules or base.__module__ in sys.stdlib_module_names or base is object:
             continue
-        path = _module_file(base.__module__)
+        path = module_file(base.__module__)
         if path is None:
             modules[f"{base.__module__}:{base.__qualname__}"] = _digest_without_file(base)
         else:
@@ -102,7 +103,7 @@ def module_closure(module: str) -> SourceClosure:
     modules: dict[str, str] = {}
     imported: set[str] = set()
     name = f"{NAME}.{module}"
-    path = _module_file(name)
+    path = module_file(name)
     assert path is not None, f"no module {name}"
     _walk(name, path, modules, imported)
     versions = {name: _version(name) for name in sorted(imported)}
@@ -140,7 +141,7 @@ def _resolve(target: str, home: str, folder: Path) -> tuple[str, Path] | None:
     top = target.partition(".")[0]
     if (top in (NAME, home) and not home.startswith("roofbench_plugin_")) or top == NAME:
         for name in (target, target.rpartition(".")[0]):
-            file = _module_file(name) if name and name != NAME else None
+            file = module_file(name) if name and name != NAME else None
             if file is not None:
                 return name, file
         return None
@@ -215,7 +216,7 @@ def _without_docstrings(tree: ast.Module) -> ast.Module:
 
 
 @lru_cache(maxsize=1024)
-def _module_file(name: str) -> Path | None:
+def module_file(name: str) -> Path | None:
     """Return the source file of a module without importing it when it is one of roofbench."""
     if name == NAME or name.startswith(NAME + "."):
         place = FOLDER.joinpath(*name.split(".")[1:])

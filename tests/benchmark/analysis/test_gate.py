@@ -244,6 +244,8 @@ def test_the_command_line_exits_0_1_and_4(cli, misbehaving, tmp_path):
     (tmp_path / "few.toml").write_text(suite_text(misbehaving, 5))
     cli("baseline", "save", "-o", "few.json", "--suite", "few.toml", "-j", 0)
     assert cli("gate", "few.json", "-d", f"{misbehaving}[side=7.0]", "-j", 0).exit_code == 4
+    with pytest.raises(RoofbenchError, match="the same content"):
+        cli("gate", "b.json", "b.json")
     other = cli("gate", "b.json", "few.json")
     assert other.exit_code == 4
     assert "Not comparable: scene hamlet-6 is only in the baseline" in other.stderr
@@ -304,21 +306,6 @@ def test_a_baseline_of_version_0_1_is_compared_with_what_is_measured_now(cli):
     assert "completeness %" in result.stdout
 
 
-def test_run_time_is_compared_side_by_side(monkeypatch, tmp_path, misbehaving):
-    from contextlib import nullcontext
-
-    from roofbench.benchmark.analysis import timing
-
-    monkeypatch.setattr(timing, "_unpacked", lambda commit: nullcontext(tmp_path))  # old code: the same code
-    scenes = {f"hamlet-{n}": BaselineScene(SceneRecipe.of_preset("hamlet", seed=n), "") for n in range(2)}
-    recipe = PluginRecipe(misbehaving, {"seconds": 0.001})
-    one = replace(baseline(measured([0.5]), 1), scenes=scenes, detectors={"d": Measured(recipe, (0,), {})})
-    (conclusion,) = timing.time_side_by_side(one, one, repeats=1)
-    assert (conclusion.conclusion, conclusion.scenes) == ("not measurable", 2)
-    assert conclusion.scenes_needed == 6
-    assert 0.05 < conclusion.candidate < 20
-
-
 @pytest.mark.parametrize(
     ("ratios", "conclusion"),
     [
@@ -334,11 +321,3 @@ def test_run_time_has_verdicts_of_its_own(ratios, conclusion):
     found = timing._conclusion("d", [np.log(ratio) for ratio in ratios], 0.1, 0.05)
     assert found.conclusion == conclusion
     assert found.candidate == pytest.approx(np.exp(np.mean(np.log(ratios))))
-
-
-def test_a_baseline_without_a_commit_cannot_be_timed():
-    from roofbench.benchmark.analysis.timing import time_side_by_side
-
-    unknown = replace(baseline(measured([0.5]), 1), version=CodeVersion("1", None, False))
-    with pytest.raises(RoofbenchError, match="names no commit"):
-        time_side_by_side(unknown, unknown)
