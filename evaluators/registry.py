@@ -19,6 +19,7 @@ EVALUATORS = Registry(
     Evaluator,
     {
         DEFAULT: "evaluators.threshold_free.evaluator:ThresholdFree",
+        "boundary": "evaluators.boundary:Boundary",
         "iou": "evaluators.iou:IoU",
         "mobj0": "evaluators.mobj0:Mobj0",
         "rutzinger": "evaluators.rutzinger:Rutzinger",

@@ -23,10 +23,11 @@ from .index import IndexGroup, index, ratio
 from .overlay.coverage import CountedSets, counted_sets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
 from .overlay.left_out import LeftOut, left_out_notes, repair_notes
+from .overlay.pair_shapes import corner_counts
 from .tally import Tallies
 from .verdict_table import Measure, Verdicts
 
-__all__ = ["DetectionIndices", "OverlayIndices", "ShapeIndices", "SongHaithcoat", "corner_counts"]
+__all__ = ["DetectionIndices", "OverlayIndices", "ShapeIndices", "SongHaithcoat"]
 
 _SOURCE = "Song & Haithcoat 2005"
 
@@ -163,14 +164,6 @@ class ShapeIndices(IndexGroup):
         symbol="C_ratio",
         meaning="mean of compactness of the detection / of the reference, compactness = 4 pi area / perimeter^2",
     )
-
-
-def corner_counts(polygons: NDArray[np.object_]) -> NDArray[np.int64]:
-    """Return the number of vertices of each polygon over all its rings, closing ones not counted, shape (n,)."""
-    parts, owner = shapely.get_parts(polygons, return_index=True)
-    rings, part = shapely.get_rings(parts, return_index=True)
-    counts = np.bincount(owner[part], weights=shapely.get_num_coordinates(rings) - 1, minlength=len(polygons))
-    return counts.astype(np.int64)
 
 
 def _compactness(polygons: NDArray[np.object_]) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ from ..tally import Tallies
 from .convex import convex_intersection_areas
 from .overlaps import Overlaps, common_ground, quadrilateral_rows
 
-__all__ = ["AreaTally", "exact_areas"]
+__all__ = ["AreaTally", "exact_areas", "mask_areas"]
 
 #: Pairs (first, second) of members that share area, and how much, m2.
 _Conflicts: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
@@ -109,6 +109,46 @@ def exact_areas(
         pair_reference=float(reference.areas[references].sum()),
         pair_shared=float(shared.sum()),
     )
+
+
+def mask_areas(
+    detected: Footprints,
+    reference: Footprints,
+    overlaps: Overlaps,
+    within: tuple[Overlaps, Overlaps],
+    counted: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+) -> tuple[float, float, float]:
+    """Return the areas of the union of the detections, of the references, and of both, m2.
+
+    Parameters
+    ----------
+    detected, reference : Footprints
+    overlaps : Overlaps
+        Pairs (detection, reference) that share area.
+    within : tuple of Overlaps
+        Pairs of detections, and pairs of references, that share area.
+    counted : tuple of ndarray of bool
+        Which detections and references belong to the masks.
+    """
+    areas = [np.where(mask, side.areas, 0.0) for side, mask in zip((detected, reference), counted, strict=True)]
+    conflicts = []
+    for pairs, masks in zip((*within, overlaps), ((counted[0],) * 2, (counted[1],) * 2, counted), strict=True):
+        kept = masks[0][pairs.first] & masks[1][pairs.second]
+        conflicts.append((pairs.first[kept], pairs.second[kept], pairs.area[kept]))
+    one = _union_area(areas[0], conflicts[0], detected.polygons.__getitem__)
+    two = _union_area(areas[1], conflicts[1], reference.polygons.__getitem__)
+    shift = len(detected)
+    first, second, shared = (
+        np.concatenate(columns)
+        for columns in zip(
+            conflicts[0],
+            (conflicts[1][0] + shift, conflicts[1][1] + shift, conflicts[1][2]),
+            (conflicts[2][0], conflicts[2][1] + shift, conflicts[2][2]),
+            strict=True,
+        )
+    )
+    every = np.concatenate([detected.polygons, reference.polygons])
+    return one, two, _union_area(np.concatenate(areas), (first, second, shared), every.__getitem__)
 
 
 def _counted(within: Overlaps, matched: NDArray[np.int64], unmatched: NDArray[np.int64], count: int) -> _Conflicts:

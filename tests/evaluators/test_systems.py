@@ -6,8 +6,21 @@ import numpy as np
 import pytest
 import shapely
 from builders.footprint_sets import random_detections, random_reference
-from naive.evaluation import overlap
-from naive.systems import average_precision, covered_share, greedy, groups, iou, main_partner, touched
+from naive.evaluation import correspondence, overlap, polis
+from naive.systems import (
+    average_precision,
+    band_iou,
+    corners,
+    covered_share,
+    edge_angle_error,
+    greedy,
+    groups,
+    hausdorff,
+    iou,
+    main_partner,
+    orthogonality,
+    touched,
+)
 
 import roofbench as rb
 from roofbench.evaluators.registry import EVALUATORS
@@ -43,6 +56,8 @@ def test_every_system_pools_exactly_comes_back_from_json_and_gives_whole_verdict
              zip(sets_of(seed), sets_of(seed + 100), strict=True)]  # fmt: skip
     together, pooled = evaluate(name, *apart), rb.pool([one, two])
     for key, value in together.values.items():
+        if key == "complexity.n_ratio_mean":
+            continue  # a mean over scenes by definition
         assert pooled.values[key] == (None if value is None else pytest.approx(value, rel=1e-6, abs=1e-9)), key
     for index in one.evaluator.indices:
         value = one.values[index.key]
@@ -72,7 +87,8 @@ def test_identity_is_perfect_and_the_evaluation_area_leaves_out(name):
     perfect = evaluate(name, REFERENCE, REFERENCE)
     best = {"higher": 1.0, "lower": 0.0}
     for index in evaluator.indices:
-        if index.better in best and index.unit == "fraction":
+        # S-IoU falls with the number of corners, whatever the other side.
+        if index.better in best and index.unit == "fraction" and index.key != "complexity.s_iou":
             assert perfect.values[index.key] == pytest.approx(best[index.better]), index.key
     partly = evaluate(name, REFERENCE, REFERENCE, area=shapely.box(-5, -5, 80, 20))
     assert partly.counts.reference == 4 if hasattr(partly, "counts") else partly.tallies.counts.reference == 4
@@ -318,3 +334,52 @@ def test_coco_leaves_out_a_detection_on_an_ignore_region_only_where_it_reaches_t
     assert spacenet.tallies.counts.detected == 1, "whatever overlaps only a left-out reference is left out"
     assert coco.tallies.counts.detected == 2, "the large one has an IoU below the threshold with it: a false positive"
     assert (spacenet.values["iou.precision"], coco.values["iou.precision"]) == (1.0, 0.5)
+
+
+def test_boundary_by_hand():
+    # A square shifted by 1 m along a side: two corners lie on the other outline's lines, two are 1 m off.
+    found = evaluate("boundary", [house(1)], [house(0)])
+    assert found.values["boundary.polis"] == pytest.approx(0.5)
+    assert found.values["boundary.hausdorff"] == pytest.approx(1.0)
+    # Bands of 1 m: 36 m2 each; they share two strips of 9 m and, of the walls across, nothing else but their ends.
+    assert found.values["boundary.iou"] == pytest.approx(18 / 54)
+    assert found.values["complexity.c_iou"] == pytest.approx(90 / 110)
+    assert found.values["complexity.n_ratio"] == 1.0
+    assert found.values["regularity.edge_angle_error"] == pytest.approx(0.0)
+    assert found.values["regularity.orthogonality"] == 1.0
+
+
+def test_one_name_for_two_formulas_gives_two_numbers():
+    # Scene: masks 100 of 120 m2, corners 4 + 6 against 4 + 4. Pairs: one perfect, one with 6 corners against 4.
+    notched = house(50) - house(50, 2, depth=2)
+    found = evaluate("boundary", [house(0), notched], [house(0), house(50)])
+    assert found.values["complexity.c_iou"] == pytest.approx((1 + 0.96 * 0.8) / 2)
+    assert found.values["complexity.c_iou_scene"] == pytest.approx(196 / 200 * (1 - 2 / 18))
+    other = evaluate("boundary", [house(0)], [house(0)])
+    pooled = rb.pool([found, other]).values
+    assert pooled["complexity.n_ratio"] == pytest.approx(14 / 12)
+    assert pooled["complexity.n_ratio_mean"] == pytest.approx((10 / 8 + 1) / 2)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_boundary_agrees_with_plain_loops(seed):
+    detected, reference = sets_of(seed)
+    evaluation = evaluate("boundary", detected, reference)
+    frame = evaluation.verdicts.detections
+    matches, _ = correspondence(detected, reference)
+    assert set(frame.index[frame["verdict"] == "pair"]) == set(matches)
+    for d, r in matches.items():
+        one, two, row = detected[d], reference[r], frame.loc[d]
+        assert row["polis"] == pytest.approx(polis(one, two), abs=1e-7)
+        assert row["hausdorff"] == pytest.approx(hausdorff(one, two), abs=1e-7)
+        assert row["boundary_iou"] == pytest.approx(band_iou(one, two, 1.0), abs=1e-7)
+        factor = 1 - abs(corners(one) - corners(two)) / (corners(one) + corners(two))
+        assert row["c_iou"] == pytest.approx(iou(one, two) * factor, abs=1e-7)
+        simple = np.mean([(1 + np.exp(0.1 * (3 - n))) / (1 + np.exp(0.1 * (corners(one) - n))) for n in (50, 90, 500)])
+        assert row["s_iou"] == pytest.approx(iou(one, two) * simple, abs=1e-7)
+        assert row["edge_angle_error"] == pytest.approx(edge_angle_error(one, two), abs=1e-6)
+        assert row["orthogonality"] == pytest.approx(orthogonality(one), abs=1e-9)
+    scene = evaluation.tallies.scene
+    masks = shapely.union_all(detected), shapely.union_all(reference)
+    assert scene.mask_united == pytest.approx(masks[0].union(masks[1]).area)
+    assert scene.mask_shared == pytest.approx(masks[0].intersection(masks[1]).area, abs=1e-6)

@@ -1,5 +1,8 @@
 """Slow, obvious oracles of the other evaluation systems: their definitions as plain loops over shapely polygons."""
 
+import itertools
+import math
+
 import shapely
 
 from naive.evaluation import overlap
@@ -67,3 +70,43 @@ def average_precision(true, references):
     for place in range(101):
         total += max((precision for recall, precision in points if recall >= place / 100 - 1e-12), default=0.0)
     return total / 101
+
+
+def outline_points(polygon):
+    parts = polygon.geoms if polygon.geom_type == "MultiPolygon" else [polygon]
+    return [list(ring.coords) for part in parts for ring in (part.exterior, *part.interiors)]
+
+
+def corners(polygon):
+    return sum(len(ring) - 1 for ring in outline_points(polygon))
+
+
+def hausdorff(one, two):
+    """Return the largest distance of a vertex of either outline from the other outline."""
+    ways = ((one, two), (two, one))
+    return max(b.boundary.distance(shapely.Point(p)) for a, b in ways for ring in outline_points(a) for p in ring)
+
+
+def band_iou(one, two, width):
+    bands = [polygon.difference(polygon.buffer(-width)) for polygon in (one, two)]
+    shared = bands[0].intersection(bands[1]).area
+    return shared / (bands[0].area + bands[1].area - shared)
+
+
+def directions(polygon):
+    pairs = [pair for ring in outline_points(polygon) for pair in itertools.pairwise(ring) if pair[0] != pair[1]]
+    return [math.degrees(math.atan2(b[1] - a[1], b[0] - a[0])) % 180 for a, b in pairs]
+
+
+def angle(one, two):
+    return min(abs(one - two), 180 - abs(one - two))
+
+
+def edge_angle_error(one, two):
+    return max(min(angle(a, b) for b in directions(two)) for a in directions(one))
+
+
+def orthogonality(polygon):
+    axis = directions(polygon.minimum_rotated_rectangle)[0]
+    own = directions(polygon)
+    return sum(min(angle(a, axis), angle(a, (axis + 90) % 180)) <= 5 for a in own) / len(own)
