@@ -8,7 +8,7 @@ folders in the current directory.
 from __future__ import annotations
 
 import inspect
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
@@ -165,7 +165,11 @@ def _described(plugin: Detector | Evaluator | type[Detector | Evaluator], *, nam
     kind = plugin if isinstance(plugin, type) else type(plugin)
     description = inspect.cleandoc(kind.__doc__ or "")
     meaning = " ".join(description.partition("\n\n")[0].split())
-    parameters, options = tuple(kind.parameters().values()), tuple(kind.execution_options().values())
+    options, parameters = tuple(kind.execution_options().values()), tuple(kind.parameters().values())
+    if not isinstance(plugin, type):
+        # A selection such as original[mode=paper]: its values, those that the mode sets included.
+        values = plugin.values()
+        parameters = tuple(replace(rule, default=values[rule.name]) for rule in parameters)
     changed = _example_value(parameters)
     selection = f"'{name}[{changed}]'" if changed else name
     if issubclass(kind, Detector):

@@ -65,6 +65,11 @@ class Parameter:
     swept: tuple[Any, ...] = ()
 
     @property
+    def is_reading(self) -> bool:
+        """Whether its source leaves it open, so that it is our reading or comes from a program."""
+        return bool({"reading", "program"} & {part.strip() for part in self.source.split(";")})
+
+    @property
     def range_text(self) -> str:
         """The rule in words, for messages and documentation."""
         if self.choices:

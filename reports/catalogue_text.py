@@ -44,7 +44,10 @@ def format_entry(entry: Entry, width: int = 80) -> str:
     if facts:
         longest = max(map(len, facts))
         parts.append("\n".join(f"{title:<{longest}}  {value}" for title, value in facts.items()))
-    for title, rules in (("Parameters", entry.parameters), ("Execution options", entry.options)):
+    readings = tuple(rule for rule in entry.parameters if rule.is_reading)
+    others = tuple(rule for rule in entry.parameters if not rule.is_reading)
+    groups = (("Parameters", others), ("Readings of what the source leaves open", readings))
+    for title, rules in (*groups, ("Execution options", entry.options)):
         if rules:
             parts.append("\n".join([title, *(_parameter(rule, width) for rule in rules)]))
     if entry.indices:

@@ -51,6 +51,15 @@ def test_a_detector_is_explained_with_its_parameters(tmp_path):
     assert "Example: roofbench run quick -d 'ndsm[height=1.5]'" in told
 
 
+def test_a_selection_is_explained_with_the_values_of_its_mode_and_readings_apart(tmp_path):
+    text = roofbench("info", "original[mode=paper,rise=0.05]", folder=tmp_path).stdout
+    for shown in ("mode [paper]", "rise [0.05]", "marking [squares]", "neighbourhood [0.75 m]"):
+        assert shown in text
+    printed, _, readings = text.partition("Readings of what the source leaves open")
+    assert "tile_size [450 px of 0.15 m]" in printed
+    assert "marking [squares]" in readings
+
+
 @pytest.mark.parametrize("name", ["Q_l", "object.quality"])
 def test_an_index_is_explained_by_key_and_by_symbol(name, tmp_path):
     assert "quality: TP/(TP+FP+FN)" in roofbench("info", name, folder=tmp_path).stdout
