@@ -7,7 +7,7 @@ class
 evidence
     log p(texture | roof) - log p(texture | crown), nats.
 
-Textures of the two classes are estimated by EM (expectation maximisation) on a histogram of cells, and held near what
+Textures of the two classes are estimated by EM (expectation maximisation) on a histogram of cells, and kept near what
 roofs and crowns are by pseudo-counts, so that a scene of roofs alone or of crowns alone keeps two classes. The heights
 of crowns are Gaussian as in Yu, Li, Guan & Wang (2013), equation 1.
 """

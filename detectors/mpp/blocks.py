@@ -1,4 +1,4 @@
-"""Blocks: one footprint for all that is built together; rectangles say where, cells say how far.
+"""Blocks: one footprint for all that is built together, located by rectangles and outlined along cells.
 
 Nouns
 -----
@@ -70,18 +70,18 @@ def _traced(built: NDArray[np.bool_], grid: Grid) -> NDArray[np.object_]:
     """
     import cv2
 
-    # Cells that touch by a corner stay together: it is the library that says whether they are one.
+    # Cells that touch by a corner stay together here; the tracing library decides whether they are one outline.
     _, labels, statistics, _ = cv2.connectedComponentsWithStats(built.astype(np.uint8), connectivity=8)
     begins = statistics[:, cv2.CC_STAT_TOP]
     ends = begins + statistics[:, cv2.CC_STAT_HEIGHT]
     found = [np.empty(0, dtype=object)]
     for top in range(0, grid.rows, _STRIP):
-        mine = (begins >= top) & (begins < top + _STRIP)
-        mine[0] = False
-        if mine.any():
-            held = mine[labels[top : ends[mine].max()]]
-            strip = Grid(grid.west, grid.north - top * grid.gsd, grid.gsd, len(held), grid.columns)
-            found.append(trace(coverage_of_mask(held), strip))
+        own = (begins >= top) & (begins < top + _STRIP)
+        own[0] = False
+        if own.any():
+            mask = own[labels[top : ends[own].max()]]
+            strip = Grid(grid.west, grid.north - top * grid.gsd, grid.gsd, len(mask), grid.columns)
+            found.append(trace(coverage_of_mask(mask), strip))
     return np.concatenate(found)
 
 

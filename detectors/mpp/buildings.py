@@ -1,4 +1,4 @@
-"""Buildings: each rectangle's part of the block that it stands in; cells say how far, rectangles where one ends.
+"""Buildings: the part of its block that belongs to each rectangle; cells show its edge, rectangles its party walls.
 
 Nouns
 -----
@@ -82,7 +82,7 @@ def outline_buildings(
         good = 2.0 if always else _AS_GOOD
         if not part.is_empty and shapely.area(shapely.intersection(part, outlines[k])) < good * together:
             result[k] = part
-    # Zones are drawn one by one, and rectangles know of no zones: where two share a strip, the first keeps it.
+    # Zones are drawn one by one, regardless of the rectangles: where two footprints share a strip, the first keeps it.
     drawn = result != outlines
     for k in np.flatnonzero(drawn):
         rivals = tree.query(outlines[k], predicate="dwithin", distance=2 * _REACH)

@@ -18,7 +18,7 @@ from .rectangles import corners
 from .sampler import ChainSchedule, Trace
 from .strips import absorb_strips
 from .threads import Threads
-from .tiles import Tile, tiles_of, work_off
+from .tiles import Tile, process_tiles, tiles_of
 from .walls import close_walls
 from .windows import Window
 
@@ -68,9 +68,11 @@ def sample_city(
         return search(window_of(tile, fixed), own, boxes, capacity=len(own) + _SEAM_ROOM, sweeps=sweeps)
 
     tiles = tiles_of(grid, size)
-    rectangles = work_off(tiles, np.empty((0, 5)), annealed, reach=reach, threads=threads)
+    rectangles = process_tiles(tiles, np.empty((0, 5)), annealed, reach=reach, threads=threads)
     if len(tiles) > 1:
-        rectangles = work_off(tiles_of(grid, size, shifted=True), rectangles, searched, reach=reach, threads=threads)
+        rectangles = process_tiles(
+            tiles_of(grid, size, shifted=True), rectangles, searched, reach=reach, threads=threads
+        )
     rectangles = np.ascontiguousarray(rectangles[np.lexsort(rectangles.T)])
     close_walls(tables, model, rectangles, _WALL_TOLERANCE * parameters.price)
     rectangles = absorb_strips(tables, model, rectangles, slender=parameters.slender, part_share=parameters.part_share)

@@ -105,7 +105,7 @@ def lower_storeys(
 ) -> None:
     """Lower the storeys of all frames among the boxes, one box after the other, in place.
 
-    Boxes that share no cell do not know of each other, so several threads work off wave after wave of such boxes.
+    Boxes that share no cell do not depend on each other, so several threads process wave after wave of such boxes.
 
     Parameters
     ----------

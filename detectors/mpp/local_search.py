@@ -35,7 +35,7 @@ def local_search(
     energies : ndarray, shape (l,)
         Of the boxes by themselves.
     capacity, sweeps : int
-        More buildings than the capacity are not held.
+        No more buildings than the capacity are kept.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """From the cloud to what the sampler reads: cells, classes, tables and boxes.
 
-At 38 bytes a cell the tables and what they are made of are the most that is held at once; arrays are let go as soon as
-they have served.
+At 38 bytes per cell the tables and what they are made of take the most memory at any time; arrays are released as soon
+as they are no longer needed.
 """
 
 from __future__ import annotations

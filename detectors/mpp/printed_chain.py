@@ -102,7 +102,7 @@ class PrintedSchedule(NamedTuple):
     buildings : float
         Mean of the Poisson distribution of the number of buildings (lambda).
     capacity : int
-        More buildings than this are not held.
+        No more buildings than this are kept.
     stride : int
         Iterations per row of the trace.
     """

@@ -1,4 +1,4 @@
-"""Roofs: what the cells inside a rectangle say about the surface above it.
+"""Roofs: the surface that fits the cells inside a rectangle best.
 
 Nouns
 -----

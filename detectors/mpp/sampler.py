@@ -301,7 +301,7 @@ def run_chain(
         First state; its centres lie in the window.
     schedule : ChainSchedule
     capacity : int
-        More buildings than this are not held; births beyond it are refused.
+        No more buildings than this are kept; births beyond it are refused.
     state : ndarray of uint64, shape (4,)
         Random stream; advanced.
     """

@@ -48,7 +48,7 @@ def absorb_strips(
     result = rectangles.copy()
     kept = np.ones(len(result), dtype=np.bool_)
     areas = result[:, 2:4].prod(axis=1)
-    # The tree knows buildings as they were; none has grown by more than this.
+    # The tree contains buildings as they were; none has grown by more than this.
     tree, grown = shapely.STRtree(shapely.polygons(corners(result))), 0.0
     for strip in np.argsort(areas, kind="stable"):
         short, long = sorted(result[strip, 2:4])

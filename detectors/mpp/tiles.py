@@ -6,9 +6,9 @@ tile
     Square of a grid that is fixed in absolute coordinates; it owns the buildings whose centre lies in it (half open).
 halo
     Buildings of other tiles within reach of a tile's own: its job sees them, fixed, and cannot overlap them unseen.
-colour
-    One of four; tiles of one colour do not touch, so that no job reads what another of its colour writes. The colours
-    are worked off one after the other, the tiles of one colour in parallel.
+group
+    One of four; tiles of one group do not touch, so that no job reads what another of its group writes. The groups are
+    processed one after the other, the tiles of one group in parallel.
 
 Because every job starts from what its neighbours have found, a building on a seam belongs to one tile and is never
 found twice; a second round on a grid shifted by half a tile lets those on the seams move and merge. Random streams
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ...scenes.geodata.raster import Grid
 from .threads import ONE_THREAD, Threads
 
-__all__ = ["Tile", "tiles_of", "work_off"]
+__all__ = ["Tile", "process_tiles", "tiles_of"]
 
 _Rectangles = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Tile:
     window: tuple[float, float, float, float]
 
     @property
-    def colour(self) -> int:
+    def group(self) -> int:
         """0 to 3."""
         return self.column % 2 + 2 * (self.row % 2)
 
@@ -101,7 +101,7 @@ def tiles_of(grid: Grid, size: float, *, shifted: bool = False) -> list[Tile]:
     return tiles
 
 
-def work_off(
+def process_tiles(
     tiles: Sequence[Tile],
     start: _Rectangles,
     job: Callable[[Tile, _Rectangles, _Rectangles], _Rectangles],
@@ -109,7 +109,7 @@ def work_off(
     reach: float,
     threads: Threads = ONE_THREAD,
 ) -> _Rectangles:
-    """Run a job per tile, colour by colour, and return all rectangles.
+    """Run a job per tile, group by group, and return all rectangles.
 
     Parameters
     ----------
@@ -119,20 +119,20 @@ def work_off(
     job : callable
         ``job(tile, own, fixed)`` returns the tile's new rectangles, centred in it.
     reach : float
-        Width of the halo, cells; less than a tile, so that tiles of one colour are independent.
+        Width of the halo, cells; less than a tile, so that tiles of one group are independent.
     threads : Threads
     """
-    held = start
-    for colour in range(4):
-        batch = [tile for tile in tiles if tile.colour == colour]
-        before = held
+    rectangles = start
+    for group in range(4):
+        batch = [tile for tile in tiles if tile.group == group]
+        before = rectangles
 
         def run(tile: Tile, before: _Rectangles = before) -> _Rectangles:
             return job(tile, before[tile.owns(before)], before[tile.sees(before, reach)])
 
         found = threads.map(run, batch)
-        kept = np.ones(len(held), dtype=bool)
+        kept = np.ones(len(rectangles), dtype=bool)
         for tile in batch:
-            kept &= ~tile.owns(held)
-        held = np.concatenate([held[kept], *found])
-    return held
+            kept &= ~tile.owns(rectangles)
+        rectangles = np.concatenate([rectangles[kept], *found])
+    return rectangles

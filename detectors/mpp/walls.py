@@ -2,8 +2,8 @@
 
 The energy is the same wherever an edge lies between two rows of cell centres, so neighbours end up to a cell apart.
 Each edge is moved, by at most a little more than a cell, to where it meets the neighbour: out until contact, or back
-until there is no common area. Edges that meet nobody stay. The move must not raise the building's own energy by more
-than a tolerance.
+until there is no common area. Edges that meet no neighbour stay. The move must not raise the energy of the building by
+itself by more than a tolerance.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Slow, obvious oracles of patches of cells and of what is eaten up and lowered around them."""
+"""Slow, obvious oracles of patches of cells and of what is assigned to them and lowered around them."""
 
 from collections import Counter
 
@@ -68,7 +68,7 @@ def assign_rough_cells(height, state, labels, high, rounds=8):
     return height, labels
 
 
-def sink(height, labels, chosen, above, ledge=30):
+def lowered(height, labels, chosen, above, ledge=30):
     """Heights after the chosen cells took the level beside them, ring by ring."""
     height, waiting = height.copy(), chosen.copy()
     roof = (labels > 0) | chosen

@@ -22,6 +22,8 @@ import shapely
 import roofbench as rb
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
+#: The references of the presets are parts of buildings, one rectangle each.
+LEVEL = "part"
 PRESETS = ("vaihingen-a-small", "toronto-a-small", "knox-small")
 ABLATIONS = {
     "as it is": "",
@@ -33,11 +35,11 @@ ABLATIONS = {
     "flat roofs alone": "roofs=flat",
     "no texture": "texture_weight=0",
     "no superstructures": "carried_share=1.1",
-    "the ground is known exactly": "ground_error=0",
+    "ground without error": "ground_error=0",
     "overlap is free": "overlap=0",
-    "strips are buildings": "slender=1000,part_share=0",
-    "a roof in sum is enough": "least_evidence=0",
-    "parts": "level=part",
+    "no test of slender parts": "slender=1000,part_share=0",
+    "no test of the mean evidence": "least_evidence=0",
+    "buildings": "level=building",
     "blocks": "level=block",
 }
 FACTORS = (0.5, 2.0)
@@ -71,7 +73,7 @@ class Case:
 
 
 def indices(scene, seen, change, chain, *, real):
-    detector = rb.make_detector(change if change == "mpp-printed" else f"mpp[{change}]")
+    detector = rb.make_detector(change if change == "mpp-printed" else f"mpp[level={LEVEL},{change}]")
     found = detector.detect(seen, np.random.default_rng(chain))
     result = rb.evaluate(found, scene.reference, area=scene.area)
     by_object, pixel = result.object.quality, result.pixel.quality
@@ -81,11 +83,11 @@ def indices(scene, seen, change, chain, *, real):
 
 
 def agreement(found, scene):
-    """Return the area in common of both unions over that of both together, where houses are not told apart."""
-    ours, theirs = (shapely.union_all(footprints.polygons) for footprints in (found, scene.reference))
+    """Return the area in common of both unions over that of both together, whichever house is which."""
+    detected, reference = (shapely.union_all(footprints.polygons) for footprints in (found, scene.reference))
     if scene.area is not None:
-        ours, theirs = shapely.intersection([ours, theirs], scene.area)
-    return ours.intersection(theirs).area / ours.union(theirs).area
+        detected, reference = shapely.intersection([detected, reference], scene.area)
+    return detected.intersection(reference).area / detected.union(reference).area
 
 
 @cache
@@ -175,7 +177,7 @@ def thinned(density):
     return thin
 
 
-def untold(cloud):
+def without_return_numbers(cloud):
     return replace(cloud, return_number=None, number_of_returns=None)
 
 
@@ -190,10 +192,10 @@ def last(cloud):
 def points(folders):
     chosen = cases(folders, presets=())
     variants = {"all returns": None} | {f"{density} points per m2": thinned(density) for density in (15, 8, 3, 1.5)}
-    variants |= {"first returns": first, "last returns": last, "return numbers unknown": untold}
+    variants |= {"first returns": first, "last returns": last, "return numbers unknown": without_return_numbers}
     variants |= {
-        "first returns, numbers unknown, 3 per m2": lambda cloud: thinned(3)(untold(first(cloud))),
-        "last returns, numbers unknown, 3 per m2": lambda cloud: thinned(3)(untold(last(cloud))),
+        "first returns, numbers unknown, 3 per m2": lambda cloud: thinned(3)(without_return_numbers(first(cloud))),
+        "last returns, numbers unknown, 3 per m2": lambda cloud: thinned(3)(without_return_numbers(last(cloud))),
     }
     head(chosen, "points (no DEM)")
     for label, change in variants.items():
@@ -289,7 +291,7 @@ def shapes(folders):
 
 
 def pictures(folders):
-    """Draw what the cells say, the convergence and the result of one run."""
+    """Draw the evidence, the convergence and the result of one run."""
     from roofbench.reports.steps.step_figure import step_figure
 
     scene = rb.open_scene(folders[0])

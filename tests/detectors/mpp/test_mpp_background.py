@@ -1,4 +1,4 @@
-"""What cells say: how large they are, and how their scores hold each other back."""
+"""The size of cells, the classes of their textures, and their scores."""
 
 import numpy as np
 import pytest

@@ -199,7 +199,7 @@ def test_removed_parameters_are_answered_with_what_to_do(name):
         make_detector(f"mpp[{name}=1]")
 
 
-def test_every_parameter_says_what_it_is_and_where_it_is_from():
+def test_every_parameter_has_a_meaning_and_a_source():
     for detector in ("mpp", "mpp-printed"):
         for rule in make_detector(detector).parameters().values():
             assert rule.doc

@@ -107,16 +107,16 @@ def test_rough_cells_are_assigned_round_by_round(threads):
 
 
 @pytest.mark.parametrize("above", [-50, 1 << 30])
-def test_cells_sink_ring_by_ring(above, threads):
+def test_cells_are_lowered_ring_by_ring(above, threads):
     height, _, roof = town(4, 60)
     labels, count = naive.label_patches(height, roof, 100)
-    sinking = np.random.default_rng(5).random(count + 1) < 0.3
-    sinking[0] = False
-    expected = naive.sink(height, labels, sinking[labels], above)
+    chosen = np.random.default_rng(5).random(count + 1) < 0.3
+    chosen[0] = False
+    expected = naive.lowered(height, labels, chosen[labels], above)
     assert (expected != height).any()
-    assert _lower_to_roof(height, labels, labels.copy(), sinking, above, threads)
+    assert _lower_to_roof(height, labels, labels.copy(), chosen, above, threads)
     np.testing.assert_array_equal(height, expected)
-    assert not _lower_to_roof(height, labels, labels.copy(), np.zeros_like(sinking), above, threads)
+    assert not _lower_to_roof(height, labels, labels.copy(), np.zeros_like(chosen), above, threads)
 
 
 def test_boxes_and_superstructures_do_not_depend_on_the_number_of_threads(threads):

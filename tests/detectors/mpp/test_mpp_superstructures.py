@@ -53,7 +53,7 @@ def test_the_shadow_of_a_tower_on_its_podium_is_podium():
     np.testing.assert_allclose(height[10:40, 15:55], 1200, atol=5)
 
 
-def test_a_penthouse_at_the_end_of_its_wing_sinks_to_the_wing_and_not_to_the_lower_one_beside():
+def test_a_penthouse_at_the_end_of_its_wing_is_lowered_to_the_wing_and_not_to_the_lower_one_beside():
     world = land()
     build(world, 4, 25, 30, 20, 12.0)
     build(world, 34, 5, 16, 40, 42.0)
@@ -77,7 +77,7 @@ def test_a_house_with_a_low_annexe_keeps_its_height():
     np.testing.assert_array_equal(lowered(world)[0], world[0])
 
 
-def test_furniture_takes_the_height_of_the_roof_around_it_up_to_its_largest_size():
+def test_roof_structures_take_the_height_of_the_roof_around_them_up_to_their_largest_size():
     world = land()
     build(world, 10, 10, 30, 30, 10.0)
     world[0][20:26, 20:26] = 1000 + np.random.default_rng(0).integers(50, 400, (6, 6))
@@ -85,7 +85,7 @@ def test_furniture_takes_the_height_of_the_roof_around_it_up_to_its_largest_size
     np.testing.assert_array_equal(lowered(world)[0][20:26, 20:26], 1000)
 
 
-def test_furniture_over_a_step_of_the_roof_sinks_to_its_levels():
+def test_a_roof_structure_over_a_step_of_the_roof_is_lowered_to_its_levels():
     world = land()
     build(world, 10, 10, 30, 20, 10.0)
     build(world, 10, 30, 30, 20, 12.0)
