@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import datetime
 import os
-import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -27,24 +26,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import CRSError, InputError, OutputError
+from ...core.errors import InputError, OutputError
 from ...core.inputs import require_file
-from .crs import file_crs, parse_crs, require_metric
+from .crs import parse_crs
+from .las_headers import HEADER_BYTES, header_crs, refuse_cut_off, refuse_pointwise, refuse_record_counts
 from .points import PointCloud
 
 __all__ = ["LasHeader", "read_las_header", "read_points", "write_points"]
 
 #: Name under which point files are written.
 _SOFTWARE = "roofbench"
-#: Length of the longest header (LAS 1.4), bytes.
-_HEADER_BYTES = 375
 #: Points unpacked at a time; about 100 MB with the scaled coordinates.
 CHUNK = 1_000_000
-#: GeoTIFF codes of linear units that are not metres, in the GeoKeys of LAS up to 1.3.
-_FEET = {9002: "feet", 9003: "US survey feet", 9005: "Clarke's feet"}
-#: How point files get another CRS.
-_REPROJECT = "reproject it, for instance with pdal's filters.reprojection, or correct its record if that is wrong"
-_HORIZONTAL_UNIT_KEY, _VERTICAL_UNIT_KEY = 3076, 4099
 
 
 @dataclass(frozen=True)
@@ -83,7 +76,7 @@ class LasHeader:
     software: str
 
 
-def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None) -> LasHeader:
+def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None, fallback: str | None = None) -> LasHeader:
     """Read the header of a point file and check that roofbench can use it.
 
     Parameters
@@ -91,6 +84,8 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None) -> 
     path : path
     crs : str, optional
         CRS that replaces the file's own (which is then not checked).
+    fallback : str, optional
+        CRS to assign where the record of the file cannot be read.
 
     Raises
     ------
@@ -102,7 +97,8 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None) -> 
     file = Path(path)
     with _opened(file) as reader:
         header = reader.header
-        _refuse_cut_off(file, header)
+        refuse_cut_off(file, header)
+        refuse_pointwise(file, header)
         scaling = np.concatenate([header.scales, header.offsets])
         if not np.isfinite(scaling).all() or (header.scales == 0).any():
             raise InputError(
@@ -114,7 +110,11 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None) -> 
         bounds = tuple(float(value) for value in (*header.mins, *header.maxs))
         if not np.isfinite(bounds).all():
             raise InputError(f"{file}: the bounds in its header, {bounds}, are not finite: export it again")
-        own = None if crs is not None else _header_crs(file, header)
+        if not any(bounds):
+            raise InputError(
+                f"{file}: the bounds in its header are all 0: write the header anew, for instance with lasinfo -repair"
+            )
+        own = None if crs is not None else header_crs(file, header, fallback)
         names = set(header.point_format.dimension_names)
         return LasHeader(
             path=file,
@@ -156,16 +156,18 @@ def read_points(
     headers = [read_las_header(file, crs="") for file in files]
     total = sum(header.count for header in headers)
     columns = _Columns(total, colour=any(h.has_colour for h in headers), nir=any(h.has_nir for h in headers))
-    own = all(header.software == _SOFTWARE for header in headers)
     seen = 0
     for header in headers:
         missed = window is not None and not _meet(window, header.bounds)
         for chunk in () if missed else _chunks(header, window):
-            columns.add(chunk, window)
+            columns.add(chunk, window, header.bounds)
             seen += len(chunk)
             if progress is not None:
                 progress(seen, total)
-    return columns.cloud(stretch=not own)
+        columns.end_file(header)
+    if seen and columns.withheld == seen:
+        raise InputError(f"{files[0]}: all points are flagged as withheld, which means that they must not be used")
+    return columns.cloud()
 
 
 @contextmanager
@@ -214,7 +216,9 @@ class _Columns:
     """Preallocated arrays that chunks are copied into; pages never written to cost no memory."""
 
     def __init__(self, total: int, *, colour: bool, nir: bool) -> None:
-        self._filled = 0
+        self._filled, self._first = 0, 0
+        self._outside = 0
+        self.withheld = 0
         self._x, self._y, self._z = (np.empty(total, dtype=np.float64) for _ in range(3))
         self._small: dict[str, NDArray[Any]] = {
             "return_number": np.empty(total, dtype=np.uint8),
@@ -224,9 +228,20 @@ class _Columns:
         }
         self._colour = np.empty((total, 3 + nir), dtype=np.uint16) if colour else None
 
-    def add(self, chunk: Any, window: tuple[float, float, float, float] | None) -> None:
+    def add(
+        self,
+        chunk: Any,
+        window: tuple[float, float, float, float] | None,
+        bounds: tuple[float, float, float, float, float, float],
+    ) -> None:
+        """Append the points of a chunk in a window, and count those outside the bounds of their file."""
         keep = np.asarray(chunk.withheld) == 0
+        self.withheld += len(keep) - int(np.count_nonzero(keep))
         x, y = np.asarray(chunk.x), np.asarray(chunk.y)
+        # Whole metres, as the extent of a scene is: what a header lacks below that is not lost.
+        low, high = np.floor(bounds[:2]), np.ceil(bounds[3:5])
+        inside = (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
+        self._outside += int(np.count_nonzero(keep & ~inside))
         if window is not None:
             keep &= (x >= window[0]) & (x <= window[2]) & (y >= window[1]) & (y <= window[3])
         everything = bool(keep.all())
@@ -244,7 +259,25 @@ class _Columns:
                 self._colour[new, band] = kept(np.asarray(chunk[name])) if name in names else 0
         self._filled = new.stop
 
-    def cloud(self, *, stretch: bool) -> PointCloud:
+    def end_file(self, header: LasHeader) -> None:
+        """Check the points of a file against its header, and stretch its colours to 16 bit.
+
+        Many programs write colours of 8 bit as they are; each file is taken by itself, since tiles are mixed.
+        """
+        if self._outside:
+            xmin, ymin, _, xmax, ymax, _ = header.bounds
+            raise InputError(
+                f"{header.path}: {self._outside} points lie outside the bounds in its header (x {xmin:.1f} to "
+                f"{xmax:.1f}, y {ymin:.1f} to {ymax:.1f}): write the header anew, for instance with lasinfo -repair"
+            )
+        if self._colour is not None and header.software != _SOFTWARE:
+            part = self._colour[self._first : self._filled]
+            if len(part) and part.max() <= 255:
+                part *= 257
+        self._first = self._filled
+
+    def cloud(self) -> PointCloud:
+        """Return the points; columns that no file fills are None."""
         end = self._filled
         small = {name: column[:end] if column[:end].any() else None for name, column in self._small.items()}
         colour = None if self._colour is None else self._colour[:end]
@@ -252,8 +285,6 @@ class _Columns:
             colour = colour[:, :3]
         if colour is not None and not colour.any():
             colour = None
-        if colour is not None and stretch and colour.max() <= 255:
-            colour *= 257  # written as 8 bit by many programs: to the full range
         return PointCloud(x=self._x[:end], y=self._y[:end], z=self._z[:end], colour=colour, **small)
 
 
@@ -266,12 +297,12 @@ def _opened(file: Path) -> Iterator[Any]:
 
     require_file(file, f"LAS, LAZ or COPC files, for instance {file}/*.laz")
     with file.open("rb") as stream:
-        head = stream.read(_HEADER_BYTES)
+        head = stream.read(HEADER_BYTES)
     if head[:4] != b"LASF":
         raise InputError(
             f"{file} is not a LAS file: it begins with {head[:4]!r} instead of b'LASF'; give LAS, LAZ or COPC files"
         )
-    _refuse_record_counts(file, head)
+    refuse_record_counts(file, head)
     try:
         with laspy.open(file) as reader:
             yield reader
@@ -282,33 +313,13 @@ def _opened(file: Path) -> Iterator[Any]:
         if "not supported" in reason:
             raise InputError(f"{file} cannot be read ({reason}): write it anew, for instance with laszip") from error
         raise InputError(f"{file} is truncated or broken ({reason}): copy or download it again") from error
-
-
-def _refuse_record_counts(file: Path, head: bytes) -> None:
-    """Refuse a header that announces more records than the file can hold, since laspy would try to read them all."""
-    size = file.stat().st_size
-    counts = [(*struct.unpack_from("<I", head, 100), 54)] if len(head) >= 104 else []
-    if len(head) == _HEADER_BYTES and head[25] >= 4:
-        counts.append((*struct.unpack_from("<I", head, 243), 60))
-    for count, least_bytes in counts:
-        if count * least_bytes > size:
-            raise InputError(
-                f"{file} is truncated or broken (its header announces {count} records of variable length in {size} "
-                "bytes): copy or download it again"
-            )
-
-
-def _refuse_cut_off(file: Path, header: Any) -> None:
-    """Refuse a file that is shorter than its header says, before records of half a file are believed."""
-    needed = header.offset_to_point_data
-    if not header.are_points_compressed:
-        needed += header.point_count * header.point_format.size
-    size = file.stat().st_size
-    if size < needed:
+    except BaseException as error:
+        # The decompressor panics on what it does not know, which is no ordinary exception.
+        if type(error).__name__ != "PanicException":
+            raise
         raise InputError(
-            f"{file} is truncated: it has {size} bytes, its header announces at least {needed}; "
-            "copy or download it again"
-        )
+            f"{file} cannot be decompressed ({error}): write it anew with a current laszip, or copy it again"
+        ) from error
 
 
 def _chunks(header: LasHeader, window: tuple[float, float, float, float] | None) -> Iterator[Any]:
@@ -349,32 +360,3 @@ def _covers(window: tuple[float, float, float, float], bounds: tuple[float, floa
 
 def _meet(window: tuple[float, float, float, float], bounds: tuple[float, float, float, float, float, float]) -> bool:
     return window[0] <= bounds[3] and window[2] >= bounds[0] and window[1] <= bounds[4] and window[3] >= bounds[1]
-
-
-def _header_crs(file: Path, header: Any) -> str | None:
-    """Return the horizontal CRS of a header after checking its units, or None when there is no record."""
-    from pyproj.exceptions import CRSError as ProjError
-
-    _refuse_feet(file, header)
-    try:
-        crs = header.parse_crs()
-    except ProjError as error:
-        raise CRSError(f"{file}: its CRS record cannot be read ({error}): name the CRS by crs=") from error
-    if crs is None:
-        return None
-    text = file_crs(crs)
-    if text is not None:
-        require_metric(crs.to_wkt(), str(file), remedy=_REPROJECT)
-    return text
-
-
-def _refuse_feet(file: Path, header: Any) -> None:
-    """Refuse GeoKeys that name feet: their CRS code alone does not define the unit of the heights."""
-    if header.vlrs.get("WktCoordinateSystemVlr"):
-        return
-    for record in header.vlrs.get("GeoKeyDirectoryVlr"):
-        for key in record.geo_keys:
-            unit = _FEET.get(key.value_offset) if key.tiff_tag_location == 0 else None
-            if unit and key.id in (_HORIZONTAL_UNIT_KEY, _VERTICAL_UNIT_KEY):
-                what = "coordinates" if key.id == _HORIZONTAL_UNIT_KEY else "heights"
-                raise CRSError(f"{file}: its {what} are in {unit}, metres are needed: {_REPROJECT}")

@@ -55,6 +55,10 @@ def image_from_points(
     if points.return_number is not None:
         first = points.return_number == 1
         x, y, colour = x[first], y[first], colour[first]
+    # Files without colour, and points that were never coloured, are black to the last bit.
+    coloured = colour.any(axis=1)
+    if not coloured.all():
+        x, y, colour = x[coloured], y[coloured], colour[coloured]
     grid = Grid.covering(extent, gsd if gsd is not None else _size(x, y, extent))
     index, inside = grid.cells(x, y)
     index, colour = index[inside], colour[inside]

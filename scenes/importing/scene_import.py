@@ -84,7 +84,7 @@ def import_scene(
     target = Path(output)
     check_folder(target, overwrite, holds=SCENE_FILES)
     log = ImportLog(note)
-    clouds = [read_las_header(file) for file in request.point_files]
+    clouds = [read_las_header(file, fallback=request.crs) for file in request.point_files]
     images = [read_raster_header(file) for file in request.image_files]
     models = [read_raster_header(file) for file in request.dem_files]
     for image in images:

@@ -1,0 +1,132 @@
+"""Properties of point files of others: stale headers, unreadable CRS records, feet by code, mixed colours."""
+
+import struct
+
+import laspy
+import numpy as np
+import pyproj
+import pytest
+from laspy.vlrs.known import GeoKeyEntryStruct, WktCoordinateSystemVlr
+
+from roofbench.core.errors import CRSError, InputError
+from roofbench.scenes.geodata.las_files import read_las_header, read_points
+from roofbench.scenes.importing.coloured_points import image_from_points
+
+WEST, SOUTH = 500000.0, 5500000.0
+
+
+def write(path, *, crs="EPSG:25832", wkt=None, keys=(), version="1.4", west=WEST, colour=None, withheld=False):
+    """Write points every metre over 20 m x 20 m, laid out from `west`."""
+    header = laspy.LasHeader(version=version, point_format=(6 if version == "1.4" else 1) if colour is None else 7)
+    header.scales, header.offsets = np.full(3, 0.001), np.array([west, SOUTH, 0.0])
+    if wkt is not None:
+        header.vlrs.append(WktCoordinateSystemVlr(wkt))
+        header.global_encoding.wkt = True
+    elif crs is not None:
+        header.add_crs(pyproj.CRS.from_user_input(crs))
+    for key, value in keys:
+        record = header.vlrs.get("GeoKeyDirectoryVlr")[0]
+        record.geo_keys.append(GeoKeyEntryStruct(key, 0, 1, value))
+        record.geo_keys_header.number_of_keys = len(record.geo_keys)
+    x, y = (values.ravel() for values in np.meshgrid(np.arange(0.5, 20), np.arange(0.5, 20)))
+    points = laspy.ScaleAwarePointRecord.zeros(len(x), header=header)
+    points.x, points.y, points.z = west + x, SOUTH + y, np.full(len(x), 100.0)
+    points.return_number[:] = 1
+    points.number_of_returns[:] = 1
+    if colour is not None:
+        points.red, points.green, points.blue = (np.full(len(x), value) for value in colour)
+    if withheld:
+        points.withheld[:] = 1
+    data = laspy.LasData(header)
+    data.points = points
+    data.write(path)
+    return path
+
+
+def with_bounds(path, xmax, xmin):
+    """Overwrite the bounds in x of a header."""
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<2d", content, 179, xmax, xmin)
+    path.write_bytes(content)
+    return path
+
+
+def test_points_outside_the_bounds_of_their_header_are_not_dropped_silently(tmp_path):
+    stale = with_bounds(write(tmp_path / "a.las"), WEST + 10, WEST)
+    with pytest.raises(InputError, match=r"200 points lie outside the bounds in its header .* write the header anew"):
+        read_points(stale, window=(WEST, SOUTH, WEST + 10, SOUTH + 20))
+    sound = write(tmp_path / "b.las")
+    assert len(read_points(sound, window=(WEST, SOUTH, WEST + 10, SOUTH + 20))) == 200
+
+
+def test_bounds_of_zero_are_refused(tmp_path):
+    zero = write(tmp_path / "a.las")
+    content = bytearray(zero.read_bytes())
+    struct.pack_into("<6d", content, 179, *np.zeros(6))
+    zero.write_bytes(content)
+    with pytest.raises(InputError, match="bounds in its header are all 0"):
+        read_las_header(zero)
+
+
+@pytest.mark.parametrize("wkt", ['PROJCS["broken', "+proj=utm +zone=32 +ellps=GRS80 +units=m"])
+def test_a_crs_record_that_cannot_be_read_is_replaced_by_the_one_that_is_given(tmp_path, wkt):
+    file = write(tmp_path / "a.las", wkt=wkt)
+    with pytest.raises(CRSError, match="cannot be read"):
+        read_las_header(file)
+    assert read_las_header(file, fallback="EPSG:25832").crs == "EPSG:25832"
+    assert read_las_header(write(tmp_path / "b.las"), fallback="EPSG:25833").crs == "EPSG:25832"
+
+
+@pytest.mark.parametrize(("code", "unit"), [(6360, "US survey foot"), (8228, "foot")])
+def test_a_vertical_system_in_feet_is_refused_by_its_code_alone(tmp_path, code, unit):
+    file = write(tmp_path / "a.las", crs="EPSG:26917", version="1.2", keys=[(4096, code)])
+    with pytest.raises(CRSError, match=f"heights are in {unit}, metres are needed"):
+        read_las_header(file)
+
+
+def test_a_vertical_system_in_metres_passes_and_so_does_one_that_is_not_registered(tmp_path):
+    for code in (5703, 5783, 32767):
+        file = write(tmp_path / f"{code}.las", crs="EPSG:26917", version="1.2", keys=[(4096, code)])
+        assert read_las_header(file).crs == "EPSG:26917"
+
+
+def test_colours_of_8_bit_are_stretched_file_by_file(tmp_path):
+    wide = write(tmp_path / "w.las", colour=(200 * 257, 100 * 257, 50 * 257))
+    narrow = write(tmp_path / "e.las", west=WEST + 20, colour=(200, 100, 50))
+    for order in ([wide, narrow], [narrow, wide], [narrow]):
+        cloud = read_points(order)
+        assert np.unique(cloud.colour, axis=0).tolist() == [[200 * 257, 100 * 257, 50 * 257]]
+
+
+def test_a_tile_without_colour_gives_no_black_image(tmp_path):
+    coloured = write(tmp_path / "w.las", colour=(200 * 257, 100 * 257, 50 * 257))
+    for bare in (
+        write(tmp_path / "e.las", west=WEST + 20),
+        write(tmp_path / "f.las", west=WEST + 20, colour=(0, 0, 0)),
+    ):
+        image = image_from_points(read_points([coloured, bare]), (WEST, SOUTH, WEST + 40, SOUTH + 20), gsd=1.0)
+        assert image.valid[:, :20].all()
+        assert not image.valid[:, 24:].any()
+        assert (image.values[:, image.valid].T == (200, 100, 50)).all()
+
+
+def test_a_file_of_withheld_points_alone_is_refused_for_that_reason(tmp_path):
+    with pytest.raises(InputError, match="all points are flagged as withheld"):
+        read_points(write(tmp_path / "a.las", withheld=True))
+
+
+def test_a_stream_compressed_point_by_point_is_refused_before_it_is_read(tmp_path):
+    file = write(tmp_path / "a.laz")
+    content = bytearray(file.read_bytes())
+    start = content.index(b"laszip encoded")
+    # The record begins after its header: user id (16 bytes), number, length, description (32 bytes).
+    struct.pack_into("<H", content, start + 16 + 4 + 32, 1)
+    file.write_bytes(content)
+    with pytest.raises(InputError, match="compressed point by point"):
+        read_las_header(file)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4978"])
+def test_points_in_geocentric_coordinates_are_refused(tmp_path, crs):
+    with pytest.raises(CRSError, match="geocentric"):
+        read_las_header(write(tmp_path / "a.las", wkt=pyproj.CRS(crs).to_wkt()))
