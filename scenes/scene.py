@@ -166,7 +166,7 @@ class Scene:
         """Return why a detector with these requirements cannot run here, or None when it can."""
         for need in requires:
             if need not in INPUTS:
-                raise InputError(f"{need!r} is nothing that a scene can hold: {', '.join(INPUTS)}")
+                raise InputError(f"{need!r} is not a supported scene input: use {', '.join(INPUTS)}")
             if not self._holds(need):
                 return f"scene {self.name!r} has no {INPUTS[need]}"
         return None

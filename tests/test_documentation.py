@@ -106,3 +106,45 @@ def test_the_tasks_of_a_contributor_touch_files_that_are_there():
         names = re.findall(r"`([\w/]+\.py)`", now)
         assert 1 <= len(names) <= 3, task
         assert [name for name in names if not any(module.endswith(f"/{name}") for module in modules)] == [], task
+
+
+#: Phrases and words that plain English does without, each with what to write instead.
+PLAIN = {
+    r"(cannot be|are not|is not) told apart": "not significant",
+    r"name no CRS, so we": "carry no CRS",
+    r"computes? nothing again": "reuse stored results",
+    r"that is borne": "significance level",
+    r"who stands for whom": "matching",
+    r"leaves? the interpreter": "exits",
+    r"returns? nonsense": "returns invalid output",
+    r"is nothing that a": "is not supported",
+    r"stochastic exactly if": "`stochastic` matches the behaviour",
+    r"is the dearest": "is the most expensive",
+    r"what still runs has nobody": "running tasks are abandoned",
+    r"Bridges are buildings": "bridges are detected as buildings",
+    r"says of every object why": "explains why",
+    r"\btold\b": "reported, printed",
+    r"\bjudge[sd]?\b": "evaluator, evaluates",
+    r"\bmended\b": "repaired",
+    r"\bborne\b": "tolerated",
+    r"\bentrants?\b": "detector entry",
+    r"\bincidents?\b": "failure or skip",
+}
+TEXTS = [
+    path
+    for room in (*ROOMS, "docs", "tests")
+    for pattern in ("*.py", "*.md", "*.toml", "*.j2", "*.template")
+    for path in (ROOT / room).rglob(pattern)
+    if path.name not in ("test_documentation.py", "published.py")
+]
+
+
+@pytest.mark.parametrize("phrase", PLAIN)
+def test_the_texts_are_in_plain_english(phrase):
+    found = [
+        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+        for path in [*TEXTS, *ROOT.glob("*.md")]
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if re.search(phrase, line, re.IGNORECASE)
+    ]
+    assert found == [], f"write: {PLAIN[phrase]}"

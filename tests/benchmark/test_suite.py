@@ -57,7 +57,7 @@ def test_scenes_and_seeds_are_selected(suite_file):
         ("side = 7", "sied = 7", r"line 9: misbehaving: no parameter 'sied' \(did you mean 'side'\?\)"),
         ("seeds = 3", 'seeds = "many"', r"line 10: seeds must be a number of seeds or a list"),
         ('"threshold-free"', '"treshold-free"', r"line 13: no evaluator called 'treshold-free'"),
-        ('preset = "hamlet"', 'path = "nowhere"', r"line 5: 'seeds' is nothing that a scene with a path takes"),
+        ('preset = "hamlet"', 'path = "nowhere"', r"line 5: 'seeds' is not allowed for a scene with a path"),
         ("[[scenes]]", "[scenes]", r"write scenes as tables with the heading \[\[scenes\]\]"),
         ('preset = "hamlet"', "preset = ", r"no valid TOML: .*line 4"),
     ],

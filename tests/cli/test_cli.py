@@ -132,9 +132,9 @@ def test_detect_writes_what_a_run_stores(cli, misbehaving):
 )
 def test_a_wrong_word_is_one_sentence_and_exit_code_2(cli, words, message, tmp_path):
     (tmp_path / "empty.json").write_text("{}")
-    told = cli(*words, code=2)
-    assert message in told
-    assert "\n" not in told
+    printed = cli(*words, code=2)
+    assert message in printed
+    assert "\n" not in printed
 
 
 @pytest.mark.parametrize(
@@ -162,10 +162,10 @@ def test_check_plugin_accepts_an_honest_detector_and_names_broken_rules(cli, mis
         "        x, y = scene.extent[:2] + np.random.default_rng().random(2)\n"
         "        return rb.Footprints.from_rectangles([[(x, y), (x + 9, y), (x + 9, y + 9), (x, y + 9)]])\n"
     )
-    told = cli("check-plugin", "bad.py", code=3).stdout
-    assert "FAILED  the same seed gives the same footprints: draw random numbers from rng only" in told
-    assert "FAILED  leaves the scene as it was" in told
-    assert "FAILED  documents its parameters: no doc= for limit" in told
+    printed = cli("check-plugin", "bad.py", code=3).stdout
+    assert "FAILED  the same seed gives the same footprints: draw random numbers from rng only" in printed
+    assert "FAILED  leaves the scene as it was" in printed
+    assert "FAILED  documents its parameters: no doc= for limit" in printed
 
 
 def test_check_plugin_accepts_the_built_in_evaluator(cli):
@@ -181,17 +181,17 @@ import numpy as np
 
 import roofbench as rb
 
-print("told while it is imported")
+print("printed while it is imported")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Leaves(rb.Detector):
-    \"\"\"Leaves the interpreter.\"\"\"
+    \"\"\"Exits the interpreter.\"\"\"
 
     name = "leaves"
 
     def detect(self, scene, rng):
-        print("told while it runs")
+        print("printed while it runs")
         sys.exit(0)
 
 
@@ -236,7 +236,7 @@ def test_check_plugin_outlives_a_detector_that_takes_its_process_along(cli, bad_
     result = cli("check-plugin", f"{bad_plugins}:{name}", code=3)
     assert problem in result.stdout
     assert "rules followed" in result.stdout.splitlines()[-1]
-    assert "told while" not in result.stdout
+    assert "printed while" not in result.stdout
 
 
 @pytest.mark.parametrize(("name", "problem"), [("Leaves", "SystemExit: 0"), ("Stumbles", "no houses at all")])
@@ -259,16 +259,16 @@ def test_detect_notices_a_file_that_was_replaced(cli, misbehaving, tmp_path):
 
 def test_pictures_of_steps_never_replace_a_folder_of_something_else(cli, tmp_path):
     rb.save_scene(hamlet(1), tmp_path / "one")
-    told = cli("detect", "ndsm", "hamlet", "--steps", "one", "--overwrite", code=2)
-    assert "one holds" in told
+    printed = cli("detect", "ndsm", "hamlet", "--steps", "one", "--overwrite", code=2)
+    assert "one holds" in printed
     cli("detect", "ndsm", "hamlet", "--steps", "steps")
     cli("detect", "ndsm", "hamlet", "--steps", "steps", "--overwrite")
 
 
 def test_the_folder_for_results_is_checked_before_the_runs(cli, misbehaving, tmp_path):
     (tmp_path / "out").write_text("a file")
-    told = cli("run", "hamlet", "-d", misbehaving, "-j", 0, "-o", "out", code=2)
-    assert "out cannot be made: it is a file" in told
+    printed = cli("run", "hamlet", "-d", misbehaving, "-j", 0, "-o", "out", code=2)
+    assert "out cannot be made: it is a file" in printed
     assert "0 of 0 runs" in cli("ls").stdout
 
 
@@ -301,5 +301,5 @@ def test_a_store_without_room_is_one_sentence(monkeypatch, tmp_path):
         raise sqlite3.OperationalError("database or disk is full")
 
     monkeypatch.setattr("roofbench.benchmark.store.writer.Store.save_plan", full)
-    told = roofbench("run", "hamlet", "-d", "ndsm", "-j", 0, folder=tmp_path, expect=2).stderr
-    assert told == "Error: the results store cannot be written or read: database or disk is full\n"
+    printed = roofbench("run", "hamlet", "-d", "ndsm", "-j", 0, folder=tmp_path, expect=2).stderr
+    assert printed == "Error: the results store cannot be written or read: database or disk is full\n"

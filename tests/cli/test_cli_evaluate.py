@@ -150,8 +150,8 @@ def test_a_scene_folder_brings_reference_area_and_grid(files):
     result = json.loads(roofbench("evaluate", "d.geojson", "small/", "-f", "json", folder=files).stdout)
     assert result["counts"]["reference"] == 2
     assert result["left_out"]["reference_outside"] == 2
-    told = "1 detection left out: outside the evaluation area, or on references that are left out"
-    assert result["notes"][1:] == [told, "2 references outside the evaluation area left out"]
+    message = "1 detection left out: outside the evaluation area, or on references that are left out"
+    assert result["notes"][1:] == [message, "2 references outside the evaluation area left out"]
     roofbench("evaluate", "d.geojson", "small/", "--plot", "v.svg", "-q", folder=files)
     drawing = (files / "v.svg").read_text(encoding="utf-8")
     assert "detection left out (1)" in drawing
@@ -174,9 +174,9 @@ def test_houses_of_a_row_are_joined_to_blocks_on_request(files):
 def test_sets_that_cannot_be_of_one_place_are_warned_of(files):
     swapped = shapely.transform(np.array(HOUSES), lambda points: points[:, ::-1] + np.array([500, 0]))
     rb.write_footprints(rb.Footprints.of(swapped, crs="EPSG:25832"), files / "swapped.gpkg")
-    told = roofbench("evaluate", "swapped.gpkg", "r.gpkg", folder=files).stderr
-    assert "warning: swapped.gpkg lies in x 500 to" in told
-    assert "no overlap at all" in told
+    message = roofbench("evaluate", "swapped.gpkg", "r.gpkg", folder=files).stderr
+    assert "warning: swapped.gpkg lies in x 500 to" in message
+    assert "no overlap at all" in message
     assert roofbench("evaluate", "d.geojson", "r.gpkg", folder=files).stderr == ""
 
 

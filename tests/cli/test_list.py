@@ -44,11 +44,11 @@ def test_scene_folders_are_listed_beside_presets(tmp_path):
 
 
 def test_a_detector_is_explained_with_its_parameters(tmp_path):
-    told = roofbench("info", "ndsm", folder=tmp_path).stdout
-    assert "ndsm (detector)" in told
-    assert "height [2.5 m], from 0.5 to 20 m" in told
-    assert "Source: Awrangjeb 2010, section 3.2" in told
-    assert "Example: roofbench run quick -d 'ndsm[height=1.5]'" in told
+    message = roofbench("info", "ndsm", folder=tmp_path).stdout
+    assert "ndsm (detector)" in message
+    assert "height [2.5 m], from 0.5 to 20 m" in message
+    assert "Source: Awrangjeb 2010, section 3.2" in message
+    assert "Example: roofbench run quick -d 'ndsm[height=1.5]'" in message
 
 
 def test_a_selection_is_explained_with_the_values_of_its_mode_and_readings_apart(tmp_path):

@@ -7,7 +7,7 @@ Run by hand::
 
 Prints processor and wall clock seconds of filling and of writing the page, and the page's size. Without a store it
 measures the large one alone, which is made here: scenes of a hamlet under changed names, detections of random boxes,
-judged in earnest.
+evaluated as in a real run.
 """
 
 import sys
@@ -35,20 +35,20 @@ RUNS, DETECTORS, VARIANTS = 10_000, 10, 7
 
 def outcomes(scene, number):
     """Return what one detector finds, in a few variants that the scenes take in turns."""
-    judge = KeyedEvaluator.of(rb.make_evaluator("threshold-free"))
+    keyed = KeyedEvaluator.of(rb.make_evaluator("threshold-free"))
     rng = np.random.default_rng(number)
     found = []
     for _ in range(VARIANTS):
         kept = scene.reference.polygons[rng.random(len(scene.reference)) < 0.5 + 0.05 * number]
         moved = [shapely.affinity.translate(polygon, *rng.normal(0, 0.7, 2)) for polygon in kept]
         detected = rb.Footprints.of(moved, crs=scene.crs)
-        evaluation = judge.evaluator.evaluate(detected, scene.reference)
+        evaluation = keyed.evaluator.evaluate(detected, scene.reference)
         found.append(
             Outcome(
                 status="ok",
                 cost=Cost(seconds=1.0, cpu_seconds=float(rng.gamma(2)), peak_memory=int(2e8)),
                 detections=tuple(shapely.to_wkb(detected.polygons).tolist()),
-                scores=(Score.of(evaluation, judge.recipe, "benchmark"),),
+                scores=(Score.of(evaluation, keyed.recipe, "benchmark"),),
                 scene=describe(scene),
                 machine=machine_facts(),
             )

@@ -55,8 +55,8 @@ def stochastic(store):
         baseline, *candidates = (chains(seeds[start : start + count]) for start in starts)
         results = [verdicts(baseline, candidate) for candidate in candidates]
         passed = sum("worse" not in result for result in results)
-        told = dict(Counter(verdict for result in results for verdict in result))
-        print(f"mpp, {count} chains a scene: {passed} of {CANDIDATES} passed; verdicts {told}")
+        message = dict(Counter(verdict for result in results for verdict in result))
+        print(f"mpp, {count} chains a scene: {passed} of {CANDIDATES} passed; verdicts {message}")
         rng = np.random.default_rng(count)
         alarms = 0
         for _ in range(PAIRS):

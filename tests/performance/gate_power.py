@@ -1,6 +1,6 @@
 """Simulate which drop the gate finds with how many scenes: ``python tests/performance/gate_power.py [PICTURE.png]``.
 
-The gate's own code judges simulated pairs: five indices, of which one drops by so much, with paired differences that
+The code of the gate tests simulated pairs: five indices, of which one drops by so much, with paired differences that
 scatter over scenes with a given standard deviation. Prints the share of ``worse`` verdicts and, as a check, the share
 of false alarms when nothing drops.
 """

@@ -1,4 +1,4 @@
-"""A detector that finds a few squares, or misbehaves as told."""
+"""A detector that finds a few squares, or misbehaves as its parameters say."""
 
 import ctypes
 import os

@@ -54,9 +54,9 @@ def test_facts_are_those_of_the_scene(saved):
 def test_facts_are_told_as_json(check):
     code, out, _ = check("--format", "json")
     assert code == 0
-    told = json.loads(out)
-    assert told["problems"] == []
-    assert told["facts"]["points"]["count"] == 4000
+    message = json.loads(out)
+    assert message["problems"] == []
+    assert message["facts"]["points"]["count"] == 4000
 
 
 def test_an_edited_file_is_told_until_its_checksum_is_updated(saved, check):

@@ -137,7 +137,7 @@ def test_plots_are_written(folder):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (("report", "nothing.sqlite", "-o", "x.html"), "no such results store"),
         (("plot", "scene", "castle", "-o", "x.png", "--store", "runs.sqlite"), "no run on 'castle'"),
@@ -147,8 +147,8 @@ def test_plots_are_written(folder):
         (("plot", "sweep", "--axis", "width", "-o", "x.png", "--store", "runs.sqlite"), "no axis 'width'"),
     ],
 )
-def test_a_mistake_gets_one_sentence(folder, arguments, told):
+def test_a_mistake_gets_one_sentence(folder, arguments, message):
     answer = roofbench(*arguments, folder=folder, expect=2)
-    assert told in answer.stderr
+    assert message in answer.stderr
     assert len(answer.stderr.strip().splitlines()) == 1
     assert not (folder / "x.png").exists()

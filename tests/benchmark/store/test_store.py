@@ -32,7 +32,7 @@ def store(tmp_path):
 
 
 @pytest.fixture
-def judge():
+def keyed():
     return KeyedEvaluator.of(make_evaluator("threshold-free"))
 
 
@@ -50,8 +50,8 @@ def identity(seed=0, **parameters):
 
 
 @pytest.fixture
-def outcome(task_of, judge):
-    task = replace(task_of(), evaluators=(judge.recipe,), describe_scene=True)
+def outcome(task_of, keyed):
+    task = replace(task_of(), evaluators=(keyed.recipe,), describe_scene=True)
     return execute(task)
 
 
@@ -59,7 +59,7 @@ def test_an_outcome_survives_the_way_between_processes(outcome):
     assert Outcome.from_bytes(outcome.to_bytes()) == outcome
 
 
-def test_raw_detections_reference_and_indices_come_back_as_they_were(store, outcome, judge):
+def test_raw_detections_reference_and_indices_come_back_as_they_were(store, outcome, keyed):
     run_id = store.record(identity(), outcome, version="1")
     scene, drawn = store.scene(store.run(run_id).scene_id), hamlet(0)
     assert shapely.equals_identical(scene.reference.polygons, drawn.reference.polygons).all()
@@ -68,10 +68,10 @@ def test_raw_detections_reference_and_indices_come_back_as_they_were(store, outc
     assert scene.content_hash == drawn.content_hash
     detected = store.detections(run_id)
     assert [shapely.to_wkb(polygon) for polygon in detected.polygons] == list(outcome.detections)
-    rebuilt = store.evaluation(run_id, judge.evaluator, judge.key)
-    direct = judge.evaluator.evaluate(detected, scene.reference, grid=scene.grid)
+    rebuilt = store.evaluation(run_id, keyed.evaluator, keyed.key)
+    direct = keyed.evaluator.evaluate(detected, scene.reference, grid=scene.grid)
     assert dict(rebuilt.values) == dict(direct.values)
-    stored = store.verdict_tables(run_id, judge.key)
+    stored = store.verdict_tables(run_id, keyed.key)
     for table, direct_table in zip(
         stored, (direct.verdicts.detection_table, direct.verdicts.reference_table), strict=True
     ):

@@ -26,7 +26,7 @@ def test_sound_polygons_pass_unchanged():
 
 
 @pytest.mark.parametrize(
-    ("geometry", "told"),
+    ("geometry", "printed"),
     [
         (None, "no geometry: left out"),
         (Polygon(), "empty: left out"),
@@ -43,10 +43,10 @@ def test_sound_polygons_pass_unchanged():
         (MultiPolygon([box(0, 0, 2, 2), box(1, 1, 3, 3)]), "Self-intersection[1 2]: repaired"),
     ],
 )
-def test_what_is_not_usable_is_told(geometry, told):
+def test_what_is_not_usable_is_told(geometry, printed):
     # Where along the ring the fault is found differs between versions of GEOS.
     (found,) = repairs(box(0, 0, 1, 1), geometry)
-    assert re.sub(r"\[.*\]", "", found) == "feature 1: " + re.sub(r"\[.*\]", "", told)
+    assert re.sub(r"\[.*\]", "", found) == "feature 1: " + re.sub(r"\[.*\]", "", printed)
 
 
 def test_mending_keeps_the_area_that_is_meant():

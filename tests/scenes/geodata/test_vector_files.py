@@ -200,8 +200,8 @@ def test_bad_geometry_is_repaired_or_left_out_by_row(geojson):
         )
     )
     assert footprints.ids.tolist() == [0, 6]
-    told = [str(repair) for repair in footprints.repairs]
-    assert told[0] == "feature 0: a ring that is not closed: repaired"
+    printed = [str(repair) for repair in footprints.repairs]
+    assert printed[0] == "feature 0: a ring that is not closed: repaired"
     assert [repair.id for repair in footprints.repairs] == [0, 1, 2, 3, 4, 5]
     assert all(repair.action == "left out" for repair in footprints.repairs[1:])
 

@@ -321,9 +321,9 @@ def test_points_where_no_land_is_are_left_out(files, bring, refused):
     heights = cloud.z.copy()
     heights[:7] = -9999
     write_points(rb.PointCloud(cloud.x, cloud.y, heights), files / "wild.laz", crs=CRS)
-    code, _, told = bring("wild.laz")
-    assert code == 0, told
-    assert "7 points at heights such as -9999 m, where no land is, were left out" in told
+    code, _, printed = bring("wild.laz")
+    assert code == 0, printed
+    assert "7 points at heights such as -9999 m, where no land is, were left out" in printed
     assert rb.open_scene(files / "out").points.z.min() > 0
     write_points(rb.PointCloud(cloud.x, cloud.y, np.full_like(heights, 5e4)), files / "space.laz", crs=CRS)
     (files / "out").rename(files / "kept")
@@ -334,9 +334,9 @@ def test_points_that_overlapping_tiles_hold_twice_are_taken_once(files, bring):
     cloud = small_scenes.cloud()
     write_points(cloud, files / "west.laz", crs=CRS)
     write_points(cloud.take(slice(5, 40)), files / "east.laz", crs=CRS)
-    code, _, told = bring("west.laz", "east.laz")
-    assert code == 0, told
-    assert "35 points that were there twice were left out" in told
+    code, _, printed = bring("west.laz", "east.laz")
+    assert code == 0, printed
+    assert "35 points that were there twice were left out" in printed
     assert len(rb.open_scene(files / "out").points) == len(cloud)
 
 
@@ -349,24 +349,24 @@ def test_points_without_crs_take_the_one_named_and_say_so(files, bring):
 
 
 def test_notes_are_kept_but_not_told_when_quiet(files, bring):
-    code, out, told = bring("points.laz", "-q")
-    assert (code, told) == (0, "")
+    code, out, printed = bring("points.laz", "-q")
+    assert (code, printed) == (0, "")
     assert "scene 'out'" in out
     assert rb.open_scene(files / "out").facts["notes"]
 
 
 def test_a_crs_may_be_a_number(files, bring):
     las(files / "bare.laz")
-    code, _, told = bring("bare.laz", "--crs", CRS.removeprefix("EPSG:"))
-    assert code == 0, told
+    code, _, printed = bring("bare.laz", "--crs", CRS.removeprefix("EPSG:"))
+    assert code == 0, printed
     assert rb.open_scene(files / "out").crs == CRS
 
 
 def test_web_mercator_is_warned_of(files, bring):
     las(files / "web.laz", crs="EPSG:3857")
-    code, _, told = bring("web.laz")
-    assert code == 0, told
-    assert "warning: EPSG:3857 shows areas" in told
+    code, _, printed = bring("web.laz")
+    assert code == 0, printed
+    assert "warning: EPSG:3857 shows areas" in printed
     assert any("EPSG:3857" in note for note in rb.open_scene(files / "out").facts["notes"])
 
 
