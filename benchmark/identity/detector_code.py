@@ -1,4 +1,4 @@
-"""The code of a detector, so that it can be told whether it changed and the old one can run again.
+"""The code of a detector, so that a change is noticed and the old code can run again.
 
 Nouns
 -----
