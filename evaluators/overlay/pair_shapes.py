@@ -21,7 +21,7 @@ __all__ = [
     "simplicity_factor",
 ]
 
-#: Numbers of corners at which simplicity is judged.
+#: Numbers of corners at which simplicity is assessed.
 _SIMPLICITY_CORNERS = (50, 90, 500)
 
 
