@@ -35,6 +35,8 @@ __all__ = [
     "write_footprints",
     "write_layers",
 ]
+#: Endings of GeoJSON, whole or a feature per line; without a CRS it is in degrees (RFC 7946).
+_JSON_ENDINGS = (".geojson", ".json", ".geojsonl", ".geojsons", ".ndjson", ".jsonl")
 
 #: Geometry type of shapely to that of OGR.
 _KINDS = {1: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon", 0: "Point", 4: "MultiPoint"}
@@ -220,6 +222,7 @@ def _read_ogr(
 
     if not (file.is_dir() and file.suffix.lower() == ".gdb"):
         require_file(file, "a vector file, for instance .gpkg or .geojson")
+    _refuse_cut_off(file)
     try:
         listed = pyogrio.list_layers(file)
         names = [str(name) for name, kind in listed if kind is not None] or [str(name) for name in listed[:, 0]]
@@ -234,6 +237,14 @@ def _read_ogr(
                 meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0])
             except UnicodeDecodeError:  # text that is not in the encoding which the file names: any byte is a letter
                 meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0], encoding="ISO-8859-1")
+            except ValueError:  # dates that are no day of the calendar: their columns are left out
+                info = pyogrio.read_info(file, layer=layer or names[0])
+                kept = [
+                    name
+                    for name, kind in zip(info["fields"], info["dtypes"], strict=True)
+                    if not str(kind).startswith("datetime")
+                ]
+                meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0], columns=kept)
     except (DataSourceError, DataLayerError) as error:
         reason = " ".join(str(error).partition("; It might help")[0].split())
         raise InputError(f"{file} cannot be read as a vector file: {reason}") from error
@@ -250,6 +261,20 @@ def _read_ogr(
 def _named_or_none(crs: str) -> str | None:
     """Return the CRS of a file as it is; None for a local or undefined one."""
     return crs if crs.upper().startswith("EPSG:") else crs if file_crs(parse_crs(crs)) is not None else None
+
+
+def _refuse_cut_off(file: Path) -> None:
+    """Refuse a Shapefile that is shorter than its header says: GDAL reads what is missing as rows without geometry."""
+    if file.suffix.lower() != ".shp":
+        return
+    size = file.stat().st_size
+    with file.open("rb") as stream:
+        head = stream.read(28)
+    announced = 2 * int.from_bytes(head[24:28], "big")
+    if len(head) < 28 or size < announced:
+        raise InputError(
+            f"{file} is truncated: it has {size} bytes, its header announces {announced}; copy or download it again"
+        )
 
 
 def _geometries(wkb: NDArray[np.object_]) -> tuple[NDArray[np.object_], list[Repair]]:
@@ -380,7 +405,7 @@ def _building_ids(file: Path, columns: Mapping[str, NDArray[Any]], name: str | N
 
 def _means_degrees(file: Path, geometries: NDArray[np.object_]) -> bool:
     """Return False for a GeoJSON that is taken as WGS 84 (RFC 7946) though it is empty, says null, or cannot be."""
-    if DRIVERS.get(file.suffix.lower()) != "GeoJSON":
+    if file.suffix.lower() not in _JSON_ENDINGS:
         return True
     if not len(geometries):
         return False
@@ -388,6 +413,11 @@ def _means_degrees(file: Path, geometries: NDArray[np.object_]) -> bool:
         if re.search(r'"crs"\s*:\s*null', stream.read(4096)):
             return False
     bounds = np.abs(shapely.total_bounds(geometries))
+    if max(bounds[0], bounds[2]) <= 90 < max(bounds[1], bounds[3]) <= 180:
+        raise CRSError(
+            f"{file}: its coordinates look like degrees with latitude first, GeoJSON has longitude first: swap the "
+            "axes, and reproject to metres, for instance with ogr2ogr -t_srs"
+        )
     return not (max(bounds[0], bounds[2]) > 360 or max(bounds[1], bounds[3]) > 90)
 
 

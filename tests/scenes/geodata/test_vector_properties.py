@@ -1,0 +1,77 @@
+"""Properties of vector files of others: cut off, impossible dates, degrees with latitude first, lines of JSON."""
+
+import json
+import struct
+
+import numpy as np
+import pyogrio.raw
+import pytest
+import shapely
+
+from roofbench.core.errors import CRSError, InputError
+from roofbench.scenes.geodata.footprints import Footprints
+from roofbench.scenes.geodata.vector_files import read_footprints, write_footprints
+
+SQUARES = shapely.box([500000, 500020, 500040], [0, 0, 0], [500010, 500030, 500050], [10, 10, 10])
+
+
+def shapefile(path, **columns):
+    pyogrio.raw.write(
+        path,
+        geometry=shapely.to_wkb(SQUARES),
+        field_data=list(columns.values()),
+        fields=np.array(list(columns), dtype=object),
+        driver="ESRI Shapefile",
+        geometry_type="Polygon",
+        crs="EPSG:25832",
+    )
+    return path
+
+
+def collection(squares):
+    features = [{"type": "Feature", "properties": {}, "geometry": shapely.geometry.mapping(one)} for one in squares]
+    return {"type": "FeatureCollection", "features": features}
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.99])
+def test_a_shapefile_that_is_cut_off_is_refused(tmp_path, share):
+    file = shapefile(tmp_path / "a.shp", number=np.arange(3))
+    assert len(read_footprints(file)) == 3
+    content = file.read_bytes()
+    file.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(InputError, match="is truncated"):
+        read_footprints(file)
+
+
+@pytest.mark.parametrize("value", [b"20200100", b"20201301", b"00000101", b"********"])
+def test_dates_that_are_no_day_cost_their_column_and_no_footprint(tmp_path, value):
+    file = shapefile(tmp_path / "a.shp", number=np.arange(3), built=np.array(["2020-01-02"] * 3, dtype="datetime64[D]"))
+    table = file.with_suffix(".dbf")
+    assert b"20200102" in table.read_bytes()
+    table.write_bytes(table.read_bytes().replace(b"20200102", value, 1))
+    found = read_footprints(file)
+    assert len(found) == 3
+    assert found.attributes["number"].tolist() == [0, 1, 2]
+
+
+def test_degrees_with_latitude_first_are_refused(tmp_path):
+    sydney = shapely.box([-33.861, -33.863], [151.2, 151.201], [-33.860, -33.862], [151.2001, 151.2011])
+    (tmp_path / "a.geojson").write_text(json.dumps(collection(sydney)))
+    with pytest.raises(CRSError, match="latitude first"):
+        read_footprints(tmp_path / "a.geojson")
+
+
+def test_json_by_lines_has_the_same_crs_as_in_one_piece(tmp_path):
+    document = collection(SQUARES)
+    (tmp_path / "a.geojson").write_text(json.dumps(document))
+    (tmp_path / "a.geojsonl").write_text("\n".join(map(json.dumps, document["features"])) + "\n")
+    for name in ("a.geojson", "a.geojsonl"):
+        found = read_footprints(tmp_path / name)
+        assert found.crs is None
+        assert len(found) == 3
+
+
+def test_a_sound_shapefile_announces_its_size(tmp_path):
+    write_footprints(Footprints.of(SQUARES, crs="EPSG:25832"), tmp_path / "a.shp")
+    content = (tmp_path / "a.shp").read_bytes()
+    assert 2 * struct.unpack_from(">i", content, 24)[0] == len(content)
