@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from ..core.errors import UnsupportedError
+from ..core.errors import RoofbenchError, UnsupportedError
 from ..detectors.base import Detector
 from ..evaluators.base import Evaluator
+from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import INPUTS, Scene
 from .identity.keys import source_closure
 from .identity.recipes import PluginRecipe, SceneRecipe, code_digest, label_of
@@ -93,12 +94,16 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class Plan:
-    """The runs of a suite, ordered by scene, the evaluators, and which stored runs are repeated."""
+    """The runs of a suite, ordered by scene, the evaluators, and which stored runs are repeated.
+
+    `warnings` name the evaluators that cannot evaluate on a scene, as far as that is known before anything runs.
+    """
 
     suite: Suite
     runs: tuple[PlannedRun, ...]
     evaluators: tuple[KeyedEvaluator, ...]
     rerun: Rerun = "missing"
+    warnings: tuple[str, ...] = ()
 
     @property
     def keys(self) -> list[str]:
@@ -203,7 +208,18 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
                 skip=skip,
             )
         )
-    return Plan(suite, tuple(runs), evaluators, rerun)
+    return Plan(suite, tuple(runs), evaluators, rerun, tuple(_warnings(suite)))
+
+
+def _warnings(suite: Suite) -> Iterator[str]:
+    """Yield which evaluators need an orthoimage on which scenes; comparing nothing with nothing shows that."""
+    bare = [scene.name for scene in suite.scenes if scene.contents is not None and "image" not in scene.contents]
+    for evaluator in suite.evaluators if bare else ():
+        try:
+            evaluator.evaluate(Footprints.empty(), Footprints.empty())
+        except RoofbenchError as error:
+            shown = ", ".join(bare[:4]) + (f" and {len(bare) - 4} more" if len(bare) > 4 else "")
+            yield f"{label_of(evaluator)} cannot evaluate on {shown} (no orthoimage): {error}"
 
 
 def _foreseen_skip(scene: SceneRecipe | Scene, requires: tuple[str, ...]) -> str:

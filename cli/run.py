@@ -90,6 +90,8 @@ def run(
         if output is not None and not dry_run:
             _make_folder(output, overwrite)
         plan = make_plan(suite, opened, rerun=rerun, only_failed=retry_failed)
+        for warning in plan.warnings:
+            console.print(f"Warning: {warning}", markup=False)
         if dry_run:
             _print_plan(plan)
             return

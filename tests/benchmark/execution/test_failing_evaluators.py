@@ -67,7 +67,11 @@ def test_score_repairs_what_an_evaluator_cannot_evaluate(misbehaving, tmp_path):
     village = hamlet(1)
     scene = rb.Scene("bare", village.extent, crs=village.crs, points=village.points, reference=village.reference)
     suite = suite_of(misbehaving, "threshold-free[area=pixels]", scene=scene)
-    _, result, (board,) = run(suite, tmp_path / "a.sqlite")
+    plan, result, (board,) = run(suite, tmp_path / "a.sqlite")
+    (warning,) = plan.warnings
+    assert warning.startswith(
+        "threshold-free[area=pixels] cannot evaluate on bare (no orthoimage): area by pixels needs"
+    )
     assert "needs a ground sampling distance" in board.unsuccessful[0].reason
     exact = suite_of(misbehaving, "threshold-free[area=exact]", scene=scene)
     with Store(tmp_path / "a.sqlite") as store:
