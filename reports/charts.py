@@ -35,7 +35,7 @@ def wilson(right: int, count: int) -> tuple[float, float]:
 
 
 def size_figure(curves: Sequence[SizeCurve]) -> Figure:
-    """Return two panels: share of references found, and of detections that are right, by footprint area."""
+    """Return two panels: share of found references and of correct detections, by footprint area."""
     figure = new_figure(9.6, 4.4)
     panels: tuple[tuple[str, str, Callable[[SizeCurve], tuple[SizeBin, ...]]], ...] = (
         ("Completeness: references found", "references", lambda curve: curve.found),
@@ -81,7 +81,7 @@ def _label_bins(axes: Axes, every: Sequence[Sequence[SizeBin]], noun: str) -> No
 
 
 def cost_figure(costs: Sequence[CostPoint]) -> Figure:
-    """Return two panels: processor time and peak memory against the size of the scene, logarithmic but for memory."""
+    """Return two panels: processor time and peak memory against scene size; all axes but memory logarithmic."""
     by_points = all(cost.points for cost in costs)
     figure = new_figure(9.6, 3.9)
     left, right = figure.subplots(1, 2)
@@ -124,7 +124,7 @@ def cost_figure(costs: Sequence[CostPoint]) -> Figure:
 
 
 def legend_below(figure: Figure) -> None:
-    """Put one legend of all labelled lines under the panels."""
+    """Draw one legend of all labelled lines below the panels."""
     found: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

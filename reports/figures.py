@@ -1,4 +1,4 @@
-"""Figures as files: PNG, SVG or PDF, whole or not at all."""
+"""Figures as files: PNG, SVG or PDF, written completely or not at all."""
 
 from __future__ import annotations
 

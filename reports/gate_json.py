@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..benchmark.analysis.results import CONCLUSIONS, GateResult, IndexConclusion
+from ..benchmark.analysis.timing import SPEED
 from ..core.errors import InputError
 from ..evaluators.base import Index
 from ..evaluators.registry import EVALUATORS
@@ -24,6 +25,7 @@ def gate_json(result: GateResult) -> str:
     content = {
         "baseline": result.baseline,
         "candidate": result.candidate,
+        "evaluator": result.evaluator,
         "level": result.level,
         "summary": gate_summary(result),
         "exit_code": result.exit_code,
@@ -43,10 +45,12 @@ def read_gate(path: Path) -> GateResult:
     """
     try:
         content = json.loads(path.read_text("utf-8"))
+        baseline, candidate, evaluator = (str(content[name]) for name in ("baseline", "candidate", "evaluator"))
         return GateResult(
-            baseline=str(content["baseline"]),
-            candidate=str(content["candidate"]),
-            conclusions=tuple(_conclusion(plain) for plain in content["conclusions"]),
+            baseline=baseline,
+            candidate=candidate,
+            evaluator=evaluator,
+            conclusions=tuple(_conclusion(plain, evaluator) for plain in content["conclusions"]),
             failures=tuple(map(str, content["failures"])),
             level=float(content["level"]),
         )
@@ -59,27 +63,28 @@ def read_gate(path: Path) -> GateResult:
         ) from error
 
 
-def _conclusion(plain: dict[str, Any]) -> IndexConclusion:
+def _conclusion(plain: dict[str, Any], evaluator: str) -> IndexConclusion:
     if plain["conclusion"] not in CONCLUSIONS:
         raise ValueError(f"unknown conclusion {plain['conclusion']!r}")
     numbers: dict[str, Any] = {name: None if plain[name] is None else float(plain[name]) for name in _NUMBERS}
     numbers |= {name: int(plain[name]) for name in _COUNTS}
     return IndexConclusion(
         detector=str(plain["detector"]),
-        index=_index(str(plain["index"])),
+        index=_index(str(plain["index"]), evaluator),
         conclusion=plain["conclusion"],
         margin=float(plain["margin"]),
         **numbers,
     )
 
 
-def _index(key: str) -> Index:
-    """Return the index of a key; one of a plugin that is not loaded has its key alone."""
-    for name in EVALUATORS.names():
-        indices: tuple[Index, ...] = EVALUATORS.get(name).indices
-        for index in indices:
-            if index.key == key:
-                return index
+def _index(key: str, evaluator: str) -> Index:
+    """Return the index of a key; run time and those of a plugin that is not loaded have their key alone."""
+    if key == SPEED.key:
+        return SPEED
+    indices: tuple[Index, ...] = EVALUATORS.get(evaluator).indices if evaluator in EVALUATORS.names() else ()
+    for index in indices:
+        if index.key == key:
+            return index
     return Index(
         key=key,
         title=key.rpartition(".")[2].replace("_", " "),

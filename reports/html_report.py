@@ -1,4 +1,4 @@
-"""The report as one HTML file: no network, a strict content security policy, everything that is data escaped.
+"""The report as one HTML file: no network, a strict content security policy, all data escaped.
 
 The page is a jinja2 template with autoescape; tables and charts stand in it as they are, maps are drawn by a script
 of our own from JSON in the page. Only that script may run: the policy names its hash.
@@ -57,7 +57,7 @@ def html_report(report: Report, *, level: float = 0.8) -> str:
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    # Parsing turns line ends into \n; so does reading as text, hence the hash is of what the browser sees.
+    # Browsers convert line ends to \n, and so does reading as text: the hash is of the script as the browser reads it.
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return environment.from_string(page).render(
         report=report,
@@ -167,7 +167,7 @@ def _pooled(board: Leaderboard) -> list[Entry]:
 
 
 def _board(board: Leaderboard) -> dict[str, Any]:
-    """Return a leaderboard as the template wants it."""
+    """Return a leaderboard in the form of the template."""
     grouped = any(entry.group for entry in board.entries)
     groups = [(name, len(list(members))) for name, members in groupby(_group_of(index) for index in board.indices)]
     starts = {0}
@@ -228,7 +228,7 @@ _POOLINGS = ("pooled", "mean")
 
 
 def _best(board: Leaderboard, index: Index, pooling: str) -> float | None:
-    """Return the best value of an index among ranked entries; None where there is nothing to be better than."""
+    """Return the best value of an index among ranked entries; None for fewer than two values or without a direction."""
     values = [
         value
         for entry in board.entries
@@ -248,7 +248,7 @@ def _group_of(index: Index) -> str:
 
 
 def _unit(index: Index) -> str:
-    """Return the unit as it follows a number."""
+    """Return the unit with the space before it."""
     sign = unit_text(index.unit)
     return f" {sign}" if sign else ""
 
@@ -261,7 +261,7 @@ def _percent_text(value: float | None, index: Index) -> str:
 
 
 def _subscripted(text: str) -> Markup:
-    """Return text, escaped, with symbols such as ``Q_l`` as they are printed."""
+    """Return escaped text with symbols such as ``Q_l`` as HTML subscripts."""
     return Markup(_SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text))))  # noqa: S704 - escaped here
 
 
@@ -339,7 +339,7 @@ def _svg(figure: Any, name: str, description: str) -> Markup:
 
 
 def write_report(filled: Report, path: Path, *, level: float = 0.8, overwrite: bool) -> int:
-    """Write a report, whole or not at all; return its size in bytes."""
+    """Write a report, completely or not at all; return its size in bytes."""
     content = html_report(filled, level=level).encode("utf-8", "xmlcharrefreplace")
     with whole_file(path, overwrite=overwrite) as scratch:
         scratch.write_bytes(content)

@@ -1,4 +1,4 @@
-"""Figures as SVG inside a page: they take the page's text colour and font, so that they follow its theme.
+"""Figures as SVG inside a page, with the text colour and font of the page, so that they follow its theme.
 
 Draw with `INK` for lines and text and `FAINT` for grids; both are replaced by the colours of the page.
 """
@@ -17,7 +17,7 @@ from matplotlib.text import Text
 
 __all__ = ["FAINT", "INK", "SERIES", "new_figure", "style_axes", "to_inline_svg"]
 
-#: Stand-ins that no picture contains by chance.
+#: Placeholders that no picture contains by chance.
 INK, FAINT = "#123457", "#cbd5e3"
 #: Colours of lines and markers (Okabe & Ito), each with its own marker, so that they differ without colour, too.
 SERIES: tuple[tuple[str, str], ...] = (
@@ -69,7 +69,7 @@ def to_inline_svg(figure: Figure, *, name: str, description: Sequence[str] | str
     """
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
-        text.set_parse_math(False)  # a name with two dollar signs is no formula
+        text.set_parse_math(False)  # a name with two dollar signs is not a formula
         if to_hex(text.get_color()) == "#000000":
             text.set_color(INK)
     file = io.StringIO()

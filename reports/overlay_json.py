@@ -1,4 +1,4 @@
-"""Scene views as the small JSON that the report's script draws.
+"""Scene views as compact JSON for the script of the report.
 
 Coordinates become whole decimetres from the upper left corner of the extent, y downwards, written as SVG path data with
 relative moves: a rectangle takes some 30 characters. Objects are parallel arrays, so that names are not repeated. A
@@ -23,17 +23,17 @@ from .verdict_style import ROLE_STYLE
 
 __all__ = ["data_uri", "path_data", "report_json"]
 
-#: Bytes that all scene pictures of a report may take together, before base64, and the most for one.
+#: Maximum size of all scene pictures of a report together and of one, bytes before base64.
 _ALL_PICTURES, _ONE_PICTURE = 3_000_000, 400_000
 _PICTURE_SIDES = (1600, 1200, 900, 700, 500, 350)
-#: Side of a picture in the gallery, pixels, and how much of the surroundings it shows, as share of the object.
+#: Side of a picture in the gallery, pixels, and the surroundings it shows, as a fraction of the object.
 _CARD, _MARGIN = 220, 0.6
 _LEAST_CARD = 24.0  # m
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 def report_json(report: Report) -> dict[str, Any]:
-    """Return what the script needs, as plain lists, numbers and text."""
+    """Return the data for the script, as plain lists, numbers and text."""
     share = _ALL_PICTURES // max(len(report.scenes), 1)
     phrases = _Phrases()
     return {
@@ -76,7 +76,7 @@ def _vocabulary(report: Report) -> dict[str, Any]:
 
 
 class _Phrases:
-    """Reasons with their numbers taken out: ``found reference 12, shifted 1.8 m`` is ``"0 12 1.8"``."""
+    """Reasons without their numbers: ``found reference 12, shifted 1.8 m`` is ``"0 12 1.8"``."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
@@ -134,12 +134,12 @@ def _scene(view: SceneView, budget: int, phrases: _Phrases) -> dict[str, Any]:
 
 
 def _within(picture: ScenePicture, budget: int) -> ScenePicture:
-    """Return the largest version of a picture that takes at most so many bytes (or the smallest there is)."""
+    """Return the largest version of a picture with at most `budget` bytes, or the smallest version."""
     if len(picture.content) <= budget:
         return picture
     smaller = picture
     for side in _PICTURE_SIDES:
-        # Bytes grow with the pixels: sizes far over the budget are not tried.
+        # The size grows with the number of pixels: versions far over the budget are not tried.
         pixels = (side / max(picture.width, picture.height)) ** 2
         if side == _PICTURE_SIDES[-1] or 0.6 * len(picture.content) * min(pixels, 1) <= budget:
             smaller = picture.at_most(side)
@@ -187,7 +187,7 @@ def _error(error: Error, view: SceneView) -> dict[str, Any]:
     half = max(longest * (0.5 + _MARGIN), _LEAST_CARD / 2)
     half = max(min(half, width / 2, height / 2), longest / 2)
     west, north = (xmin + xmax) / 2 - half - view.extent[0], view.extent[3] - (ymin + ymax) / 2 - half
-    # Moved inside the picture where it fits.
+    # Moved into the picture where it is large enough.
     west, north = min(max(west, 0.0), max(width - 2 * half, west)), min(max(north, 0.0), max(height - 2 * half, north))
     picture = None
     if view.picture is not None:

@@ -1,4 +1,4 @@
-"""Sensitivity plots: quality against a detector's parameters and against what makes scenes hard.
+"""Sensitivity plots: quality against parameters of detectors and of scenes.
 
 After figure 8 of Awrangjeb, Ravanbakhsh & Fraser (2010), section 4.4.1, which plots object- and area-based quality
 against five values of five parameters, the others at their standard values. Here each axis has a panel of its own
@@ -43,7 +43,7 @@ def sensitivity_figure(lines: Sequence[Sensitivity], *, level: float | None = No
     columns = min(_COLUMNS, len(axes_names))
     rows = math.ceil(len(axes_names) / columns)
     figure = new_figure(max(4.4, 3.25 * columns), 2.75 * rows + 0.35 * math.ceil((len(detectors) + len(indices)) / 4))
-    # One scale for all panels, so that what matters more looks steeper.
+    # One scale for all panels, so that slopes can be compared.
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     percent = all(index.unit == "fraction" for index in indices)
     factor = 100.0 if percent else 1.0
@@ -73,7 +73,7 @@ def _named(key: str) -> str:
 
 
 def _places(lines: Sequence[Sensitivity]) -> tuple[list[Any], dict[Any, float]]:
-    """Return the values of an axis in order, and where each is drawn: numbers to scale, others side by side."""
+    """Return the values of an axis in order, and their places: numbers to scale, others at equal distances."""
     values = list({point.value: None for line in lines for point in line.points})
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         values.sort()

@@ -102,6 +102,7 @@ def compare(
     return GateResult(
         baseline=str(baseline.version),
         candidate=str(candidate.version),
+        evaluator=baseline.evaluator.use,
         conclusions=(*conclusions, *extra),
         failures=tuple(failures),
         level=level,

@@ -198,6 +198,8 @@ class GateResult:
     ----------
     baseline, candidate : str
         What was compared: version with commit.
+    evaluator : str
+        Name of the evaluator whose indices are gated.
     conclusions : tuple of IndexConclusion
     failures : tuple of str
         Runs that the candidate failed where the baseline had a result.
@@ -206,6 +208,7 @@ class GateResult:
 
     baseline: str
     candidate: str
+    evaluator: str
     conclusions: tuple[IndexConclusion, ...]
     failures: tuple[str, ...]
     level: float

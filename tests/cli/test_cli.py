@@ -48,7 +48,7 @@ def test_a_failing_detector_is_exit_code_3_with_reason_and_command(cli, misbehav
 
 
 def test_nothing_measured_is_exit_code_4(cli, misbehaving, tmp_path):
-    scene = rb.Scene("bare", (0, 0, 200, 200), points=rb.PointCloud(*np.zeros((3, 4))))
+    scene = rb.Scene("bare", (0, 0, 200, 200), points=rb.PointCloud(*np.ones((3, 4))))
     rb.save_scene(scene, tmp_path / "bare")
     result = cli("run", "bare", "-d", misbehaving, "-j", 0, code=4)
     assert "bare has no reference and is left out" in result.stdout

@@ -30,7 +30,12 @@ def result():
         for index, conclusion, effect in zip(ThresholdFree.indices[:5], CONCLUSIONS, effects, strict=True)
     )
     return GateResult(
-        baseline="0.1 (a)", candidate="0.1 (b)", conclusions=conclusions, failures=("original on x",), level=0.05
+        baseline="0.1 (a)",
+        candidate="0.1 (b)",
+        evaluator="threshold-free",
+        conclusions=conclusions,
+        failures=("original on x",),
+        level=0.05,
     )
 
 

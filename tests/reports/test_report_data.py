@@ -41,7 +41,7 @@ def test_every_scene_is_drawn_with_picture_and_every_detector(filled):
 
 
 def test_a_store_of_version_0_1_is_reported_and_its_maps_come_back_by_scoring_it_again(tmp_path):
-    shutil.copy(Path(__file__).parents[2] / "data" / "store-0.1.db", tmp_path / "runs.sqlite")
+    shutil.copy(Path(__file__).parents[1] / "data" / "store-0.1.db", tmp_path / "runs.sqlite")
     with Store(tmp_path / "runs.sqlite") as opened:
         old = fill_report(opened, newest_runs(opened), title="old")
     assert old.boards[0].entries[0].cells["object.quality"].value == 22 / 31
