@@ -82,13 +82,16 @@ def evaluate(
     Files may be GeoJSON, GeoPackage, Shapefile, FlatGeobuf or GeoParquet, in a projected CRS in metres.
     """
     from ..core.errors import InputError, UnsupportedError
-    from ..evaluators.registry import make_evaluator
-    from ..reports.evaluation_text import format_evaluation
+    from ..evaluators.registry import ALL, all_evaluators, make_evaluator
+    from ..reports.evaluation_text import format_evaluation, format_evaluations
     from ..scenes.geodata.vector_files import read_footprints, read_polygon
 
     chosen: dict[str, Any] = {"matching": matching, "area": area, "gsd": gsd, "minimum_area": minimum_area}
     given = {name: str(value) for name, value in chosen.items() if value is not None}
-    scorer = make_evaluator(evaluator, given)
+    every = evaluator == ALL
+    if every and (verdicts is not None or plot is not None):
+        raise InputError(f"verdicts= and plot= show one evaluator: leave them out, or evaluator={ALL}")
+    scorers = all_evaluators(given) if every else [make_evaluator(evaluator, given)]
     _check_targets(verdicts, plot, inputs=(detected, reference, evaluation_area), overwrite=overwrite)
     if building_id is not None and join_gaps is not None:
         raise InputError("blocks of joined footprints have no building ids: set building_id= or join_gaps=, not both")
@@ -126,12 +129,14 @@ def evaluate(
         )
     if join_gaps is not None:
         truth = truth.joined(join_gaps)
-    result = scorer.evaluate(found, truth, area=boundary, grid=grid)
-    title = f"{_short(detected)} against {_short(reference)}"
+    results = [scorer.evaluate(found, truth, area=boundary, grid=grid) for scorer in scorers]
+    result, title = results[0], f"{_short(detected)} against {_short(reference)}"
     if verdicts is not None or plot is not None:
         objects = result.verdicts
         if objects is None:
-            raise UnsupportedError(f"the evaluator {scorer.name!r} gives no verdicts: leave out verdicts= and plot=")
+            raise UnsupportedError(
+                f"the evaluator {scorers[0].name!r} gives no verdicts: leave out verdicts= and plot="
+            )
         if verdicts is not None:
             from ..reports.verdict_layers import write_verdicts
 
@@ -141,7 +146,9 @@ def evaluate(
             from ..reports.verdict_map import verdict_figure
 
             save_figure(verdict_figure(result, title=title, area=boundary), plot, overwrite=overwrite)
-    typer.echo(format_evaluation(result, form, title=title))
+    typer.echo(
+        format_evaluations(results, form, title=title) if every else format_evaluation(result, form, title=title)
+    )
 
 
 def _warn_of_place(detected: Footprints, reference: Footprints) -> None:

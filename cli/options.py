@@ -110,7 +110,7 @@ EvaluatorOption = Annotated[
         "--evaluator",
         "-e",
         metavar="EVALUATOR",
-        help=f"{_SELECTION}; that of the 2010 paper by default.",
+        help=f"{_SELECTION}, or all; that of the 2010 paper by default.",
         autocompletion=completion.evaluators,
     ),
 ]

@@ -30,6 +30,8 @@ from .tally import Tallies
 from .verdict_table import Measure, Side, VerdictKind, Verdicts
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
     from shapely import Geometry
 
 __all__ = ["Better", "Evaluation", "Evaluator", "Index", "Verdicts", "mean_values"]
@@ -64,10 +66,15 @@ class Evaluation:
         """A verdict with its reason for every object; None of a pooled evaluation."""
         return None if self.find_verdicts is None else self.find_verdicts()
 
+    @cached_property
+    def curves(self) -> Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Every curve by its key, as x and y; bars have one x more, their bounds."""
+        return {curve.key: curve.formula(self.tallies) for curve in self.evaluator.curves}
+
     def to_dict(self) -> dict[str, Any]:
         """Return what JSON holds: nested by the parts of the names, ``null`` where undefined.
 
-        Counts come first, then the index groups, then the other tallies.
+        Counts come first, then the index groups, then the other tallies and the curves.
         """
         content: dict[str, Any] = {"evaluator": self.evaluator.name, "parameters": self.evaluator.values()}
         tallies = self.tallies.to_dict()
@@ -76,6 +83,11 @@ class Evaluation:
         for key, value in [*counts.items(), *self.values.items()]:
             _place(content, key, value)
         content["tallies"] = others
+        if self.evaluator.curves:
+            content["curves"] = {
+                key: {"x": x.tolist(), "y": [None if value != value else value for value in y.tolist()]}
+                for key, (x, y) in self.curves.items()
+            }
         content["notes"] = list(self.notes)
         return content
 

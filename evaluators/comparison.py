@@ -12,12 +12,12 @@ from ..scenes.geodata.crs import require_metric
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.geodata.raster import Grid
 from .base import Evaluation, Evaluator
-from .registry import DEFAULT, make_evaluator
+from .registry import DEFAULT, all_evaluators, make_evaluator
 
 if TYPE_CHECKING:
     from .threshold_free.evaluator import ThresholdFreeEvaluation
 
-__all__ = ["evaluate", "pool"]
+__all__ = ["evaluate", "evaluate_all", "pool"]
 
 
 @overload
@@ -88,6 +88,49 @@ def evaluate(
     >>> evaluation.object.completeness, evaluation.geometric.rmse
     (0.5, 1.0)
     """
+    chosen = make_evaluator(evaluator, parameters)
+    _require_comparable(detected, reference, area, chosen)
+    return chosen.evaluate(detected, reference, area=area, grid=grid)
+
+
+def evaluate_all(
+    detected: Footprints,
+    reference: Footprints,
+    *,
+    area: Geometry | None = None,
+    grid: Grid | None = None,
+    **parameters: Any,
+) -> dict[str, Evaluation]:
+    """Compare detected with reference footprints by every evaluator; see `evaluate`.
+
+    Parameters
+    ----------
+    detected, reference : Footprints
+    area : polygon, optional
+    grid : Grid, optional
+    **parameters
+        Given to the evaluators that have them.
+
+    Returns
+    -------
+    dict of str to Evaluation
+        By the name of the evaluator, the default one first.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> houses = Footprints.of([shapely.box(0, 0, 10, 10), shapely.box(20, 0, 30, 10)])
+    >>> list(evaluate_all(houses, houses))[:3]
+    ['threshold-free', 'boundary', 'iou']
+    """
+    found = {}
+    for evaluator in all_evaluators(parameters):
+        _require_comparable(detected, reference, area, evaluator)
+        found[evaluator.name] = evaluator.evaluate(detected, reference, area=area, grid=grid)
+    return found
+
+
+def _require_comparable(detected: Any, reference: Any, area: Any, evaluator: Evaluator) -> None:
     for footprints, role in ((detected, "detected"), (reference, "reference")):
         if not isinstance(footprints, Footprints):
             raise InputError(
@@ -96,10 +139,8 @@ def evaluate(
             )
         if len(footprints):
             require_metric(footprints.crs, footprints.source, heights=False)
-    chosen = make_evaluator(evaluator, parameters)
     if area is not None:
-        _require_polygon(area, chosen)
-    return chosen.evaluate(detected, reference, area=area, grid=grid)
+        _require_polygon(area, evaluator)
 
 
 def _require_polygon(area: Any, evaluator: Evaluator) -> None:

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.registry import Registry, parse_selection
+from ..core.errors import ParameterError
+from ..core.registry import Registry, nearest_hint, parse_selection
 from .base import Evaluator
 
-__all__ = ["DEFAULT", "EVALUATORS", "make_evaluator"]
+__all__ = ["ALL", "DEFAULT", "EVALUATORS", "all_evaluators", "make_evaluator"]
 
 #: Name of the evaluator that is used when none is chosen.
 DEFAULT = "threshold-free"
+#: Stands for every evaluator, where several can be used.
+ALL = "all"
 
 EVALUATORS = Registry(
     "evaluator",
@@ -40,3 +43,29 @@ def make_evaluator(selection: str | Evaluator | None = None, parameters: Mapping
     name, values = parse_selection(selection or DEFAULT)
     evaluator: Evaluator = EVALUATORS.get(name).build({**values, **(parameters or {})})
     return evaluator
+
+
+def all_evaluators(parameters: Mapping[str, Any] | None = None) -> list[Evaluator]:
+    """Return every evaluator, the default one first, each with those of the parameters that it has.
+
+    A choice (such as ``matching="overlap"``) is given to the evaluators that know it.
+
+    Raises
+    ------
+    ParameterError
+        No evaluator has a parameter of that name, or knows that choice.
+    """
+    names = [DEFAULT, *(name for name in EVALUATORS.names() if name != DEFAULT)]
+    kinds = [EVALUATORS.get(name) for name in names]
+    chosen: list[dict[str, Any]] = [{} for _ in kinds]
+    for name, value in (parameters or {}).items():
+        rules = [kind.parameters().get(name) for kind in kinds]
+        fitting = [place for place, rule in enumerate(rules) if rule and (not rule.choices or value in rule.choices)]
+        if not fitting:
+            known = sorted({known for kind in kinds for known in kind.parameters()})
+            choices = dict.fromkeys(str(choice) for rule in rules if rule for choice in rule.choices)
+            hint = f"; it is one of {', '.join(choices)}" if choices else nearest_hint(name, known)
+            raise ParameterError(f"no evaluator has a parameter {name}={value}{hint}; there are {', '.join(known)}")
+        for place in fitting:
+            chosen[place][name] = value
+    return [kind.build(values) for kind, values in zip(kinds, chosen, strict=True)]

@@ -6,14 +6,14 @@ Fractions are printed as percent; an undefined index (0/0) as a dash in tables a
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 from ..evaluators.base import Evaluation, Index
 from .format import value_text
 from .tables import Column, Table, escaped_markdown
 
-__all__ = ["described", "evaluation_table", "format_evaluation"]
+__all__ = ["described", "evaluation_table", "format_evaluation", "format_evaluations"]
 
 
 def format_evaluation(evaluation: Evaluation, form: Literal["table", "json", "csv", "md"], *, title: str = "") -> str:
@@ -40,6 +40,35 @@ def format_evaluation(evaluation: Evaluation, form: Literal["table", "json", "cs
     lines += [""] if evaluation.notes else []
     lines += [f"- {escaped_markdown(note)}" if markdown else f"Note: {note}" for note in evaluation.notes]
     return "\n".join(lines)
+
+
+def format_evaluations(
+    evaluations: Sequence[Evaluation], form: Literal["table", "json", "csv", "md"], *, title: str = ""
+) -> str:
+    """Return several evaluations of the same footprints below each other: one table of their main indices."""
+    if form == "json":
+        content = {evaluation.evaluator.name: evaluation.to_dict() for evaluation in evaluations}
+        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    if form == "csv":
+        data = (
+            (evaluation.evaluator.name, i.key, i.title, i.symbol, evaluation.values[i.key], i.unit)
+            for evaluation in evaluations
+            for i in evaluation.evaluator.indices
+        )
+        heads = map(Column, ("evaluator", "key", "index", "symbol", "value", "unit"))
+        return Table.of(heads, data).to_csv().rstrip("\n")
+    rows = []
+    for evaluation in evaluations:
+        main = [index for index in evaluation.evaluator.indices if index.main]
+        for place, (name, symbol, value) in enumerate(evaluation_table(evaluation, main).rows):
+            rows.append(("" if place else evaluation.evaluator.name, name, symbol, value))
+    columns = (Column("evaluator", "left"), Column("index", "left"), Column("symbol", "left"), Column("value"))
+    table = Table.of(columns, rows)
+    markdown = form == "md"
+    lines = [f"### {escaped_markdown(title)}" if markdown else title, ""] if title else []
+    lines += [table.to_markdown() if markdown else table.to_text(), ""]
+    notes = dict.fromkeys(note for evaluation in evaluations for note in evaluation.notes)
+    return "\n".join([*lines, *(f"- {escaped_markdown(note)}" if markdown else f"Note: {note}" for note in notes)])
 
 
 def evaluation_table(evaluation: Evaluation, indices: Iterable[Index]) -> Table:

@@ -4,7 +4,9 @@ import pytest
 import shapely
 
 import roofbench as rb
-from roofbench.core.errors import CRSError, InputError
+from roofbench.core.errors import CRSError, InputError, ParameterError
+from roofbench.evaluators.comparison import evaluate_all
+from roofbench.evaluators.registry import DEFAULT, EVALUATORS
 
 HOUSE = shapely.box(0, 0, 10, 10)
 HOUSES = rb.Footprints.of([HOUSE])
@@ -41,3 +43,30 @@ def test_a_pooled_evaluation_says_how_areas_were_measured():
 def test_a_list_of_polygons_is_no_footprint_set():
     with pytest.raises(InputError, match=r"reference is list, not Footprints: .* Footprints\.of"):
         rb.evaluate(HOUSES, [HOUSE])
+
+
+def test_all_evaluators_compare_the_same_sets_with_the_parameters_that_they_have():
+    found = evaluate_all(HOUSES, HOUSES, matching="one-pass", minimum_area=5)
+    assert set(found) == set(EVALUATORS.names())
+    assert next(iter(found)) == DEFAULT
+    assert found["boundary"].evaluator.matching == found[DEFAULT].evaluator.matching == "one-pass"
+    assert found["iou"].evaluator.matching == "spacenet", "another set of choices"
+    assert {evaluation.evaluator.minimum_area for evaluation in found.values()} == {5.0}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"matching": "nearst"}, "one of nearest, one-pass, overlap, spacenet, coco"),
+        ({"minimum_aera": 5}, "did you mean 'minimum_area'"),
+    ],
+)
+def test_a_parameter_that_no_evaluator_knows_is_refused(wrong, message):
+    with pytest.raises(ParameterError, match=message):
+        evaluate_all(HOUSES, HOUSES, **wrong)
+
+
+@pytest.mark.parametrize("name", EVALUATORS.names())
+def test_a_missing_detection_set_is_refused_by_every_evaluator(name):
+    with pytest.raises(InputError, match="detected is NoneType"):
+        rb.evaluate(None, HOUSES, evaluator=name)

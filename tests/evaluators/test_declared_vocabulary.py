@@ -107,6 +107,21 @@ def test_a_comparison_of_two_files_prints_writes_and_draws_them(tmp_path):
     assert (tmp_path / "map.png").stat().st_size > 0
 
 
+@pytest.mark.parametrize("form", ["table", "md", "csv", "json"])
+def test_all_evaluators_are_printed_in_one_table(tmp_path, form):
+    reference = hamlet(1).reference
+    rb.write_footprints(reference, tmp_path / "a.gpkg")
+    answer = roofbench("evaluate", "a.gpkg", "a.gpkg", "-e", "all", "-f", form, folder=tmp_path)
+    for name in EVALUATORS.names():
+        assert name in answer.stdout
+    if form == "json":
+        content = json.loads(answer.stdout)
+        assert content["iou"]["iou"]["f1"] == 1.0
+        assert len(content["shufelt"]["curves"]["references_covered"]["y"]) == 101
+    refused = roofbench("evaluate", "a.gpkg", "a.gpkg", "-e", "all", "--plot", "a.png", folder=tmp_path, expect=2)
+    assert "show one evaluator" in refused.stderr
+
+
 def test_no_other_room_knows_the_vocabulary_of_an_evaluator():
     words = re.compile(r"threshold[-_]free|object\.quality|[\"'](TP|MD|FP|FN)[\"']")
     rooms = [Path(rb.__file__).parent / room for room in ("core", "scenes", "detectors", "benchmark", "reports", "cli")]
