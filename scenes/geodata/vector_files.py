@@ -24,7 +24,9 @@ from ...core.output import whole_file
 from ...core.registry import nearest_hint
 from .crs import common_crs, crs_label, file_crs, named_crs, parse_crs, require_metric, same_crs
 from .footprints import Footprints, Repair
+from .parquet_files import read_parquet, write_parquet
 from .vector_columns import storable_columns
+from .wkb import geometries_of_wkb
 
 __all__ = [
     "DRIVERS",
@@ -104,7 +106,7 @@ def read_footprints(
         crs = named_crs(crs)
     closed: list[Repair] = []
     if DRIVERS.get(file.suffix.lower()) == "Parquet":
-        geometries, columns, own_crs = _read_parquet(file)
+        geometries, columns, own_crs, closed = read_parquet(file)
     else:
         geometries, columns, own_crs, closed = _read_ogr(file, layer)
     if crs is None and own_crs == "EPSG:4326" and not _means_degrees(file, geometries):
@@ -209,7 +211,7 @@ def write_layers(
             if driver == "GPKG" and layer.lower().startswith(("gpkg", "sqlite")):
                 layer = f"layer_{layer}"
             if driver == "Parquet":
-                _write_parquet(scratch, geometries, columns, crs)
+                write_parquet(scratch, geometries, columns, crs)
             else:
                 _write_ogr(scratch, driver, layer, geometries, columns, crs, append=number > 0)
 
@@ -253,7 +255,7 @@ def _read_ogr(
     columns = dict(zip(map(str, meta["fields"]), fields, strict=True))
     if file.suffix.lower() == ".shp" and "building_i" in columns:
         columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name
-    geometries, closed = _geometries(wkb)
+    geometries, closed = geometries_of_wkb(wkb, file)
     crs = None if meta["crs"] is None else _named_or_none(meta["crs"])
     return geometries, columns, crs, closed
 
@@ -277,41 +279,12 @@ def _refuse_cut_off(file: Path) -> None:
         )
 
 
-def _geometries(wkb: NDArray[np.object_]) -> tuple[NDArray[np.object_], list[Repair]]:
-    """Return geometries of WKB; rings that end elsewhere than they began are closed and reported."""
-    closed = []
-    with np.errstate(invalid="ignore"):  # coordinates that are NaN: left out and reported by Footprints.of
-        geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
-        unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
-        for row in unread:
-            geometries[row] = shapely.from_wkb(wkb[row], on_invalid="fix")
-            closed.append(Repair(int(row), "a ring that is not closed", "repaired"))
-    return geometries, closed
-
-
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep GDAL's warnings about what is meant (no CRS, short names, NaN in JSON) from the user."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
-
-
-def _read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None]:
-    require_file(file, "a vector file, for instance .gpkg or .geojson")
-    geopandas = _parquet_support(file, InputError)
-    try:
-        frame = geopandas.read_parquet(file)
-    except (ValueError, OSError) as error:
-        raise InputError(f"{file} cannot be read as GeoParquet: {' '.join(str(error).split())}") from error
-    columns = {}
-    for name in frame.columns:
-        if name != frame.geometry.name:
-            values = frame[name].to_numpy()
-            if values.dtype.kind == "O":
-                values = np.where(frame[name].isna(), None, values)
-            columns[str(name)] = values
-    return np.asarray(frame.geometry.array, dtype=object), columns, None if frame.crs is None else file_crs(frame.crs)
 
 
 def _write_ogr(
@@ -362,30 +335,6 @@ def _say_no_crs(file: Path) -> None:
     start = '"type": "FeatureCollection",'
     text = file.read_text(encoding="utf-8")
     file.write_text(text.replace(start, f'{start}\n"crs": null,', 1), encoding="utf-8")
-
-
-def _write_parquet(
-    file: Path, geometries: NDArray[np.object_], columns: Mapping[str, NDArray[Any]], crs: str | None
-) -> None:
-    geopandas = _parquet_support(file, OutputError)
-    frame = geopandas.GeoDataFrame(dict(columns), geometry=list(geometries), crs=crs)
-    frame.to_parquet(file)
-
-
-def _parquet_support(file: Path, error: type[InputError] | type[OutputError]) -> Any:
-    try:
-        import geopandas
-        import pyarrow.parquet  # noqa: F401
-    except ImportError as missing:
-        raise error(f"{file.name}: GeoParquet needs pyarrow: pip install 'roofbench[parquet]'") from missing
-    return geopandas
-
-
-def _crs_text(crs: Any) -> str | None:
-    if crs is None:
-        return None
-    authority = crs.to_authority()
-    return ":".join(authority) if authority else str(crs.to_wkt())
 
 
 def _building_ids(file: Path, columns: Mapping[str, NDArray[Any]], name: str | None) -> NDArray[Any] | None:

@@ -75,3 +75,27 @@ def test_a_sound_shapefile_announces_its_size(tmp_path):
     write_footprints(Footprints.of(SQUARES, crs="EPSG:25832"), tmp_path / "a.shp")
     content = (tmp_path / "a.shp").read_bytes()
     assert 2 * struct.unpack_from(">i", content, 24)[0] == len(content)
+
+
+def test_a_ring_of_geoparquet_that_is_not_closed_is_closed_and_reported(tmp_path):
+    geopandas = pytest.importorskip("geopandas")
+    pq, pa = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("pyarrow")
+    file = tmp_path / "a.parquet"
+    geopandas.GeoDataFrame({"number": [1, 2, 3]}, geometry=list(SQUARES), crs="EPSG:25832").to_parquet(file)
+    table = pq.read_table(file)
+    wkb = table["geometry"].to_pylist()
+    # One vertex less: the number of points of the ring follows byte order, type and number of rings.
+    open_ring = wkb[1][:9] + struct.pack("<I", 4) + wkb[1][13:-16]
+    for broken, sound in ((open_ring, True), (wkb[1][:-7], False)):
+        column = pa.array([wkb[0], broken, wkb[2]])
+        changed = table.set_column(table.schema.get_field_index("geometry"), table.schema.field("geometry"), column)
+        pq.write_table(changed, file)
+        if sound:
+            found = read_footprints(file)
+            assert len(found) == 3
+            assert shapely.area(found.polygons).tolist() == [100, 100, 100]
+            assert found.crs == "EPSG:25832"
+            assert [str(repair) for repair in found.repairs] == ["feature 1: a ring that is not closed: repaired"]
+        else:
+            with pytest.raises(InputError, match="the geometry of feature 1 is damaged"):
+                read_footprints(file)
