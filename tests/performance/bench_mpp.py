@@ -42,7 +42,7 @@ STAGES = {
     "walls": ("city", "close_walls"),
     "footprints": ("mpp_detector", "as_footprints"),
 }
-LEVEL = "rectangles"
+LEVEL = "building"
 EFFORTS = (0, 0.1, 0.25, 0.5, 1, 2, 4)
 
 
