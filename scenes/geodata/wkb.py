@@ -23,6 +23,9 @@ def geometries_of_wkb(wkb: NDArray[np.object_], file: Path) -> tuple[NDArray[np.
         for row in unread:
             geometries[row] = shapely.from_wkb(wkb[row], on_invalid="fix")
             if geometries[row] is None:
-                raise InputError(f"{file}: the geometry of feature {row} is damaged: copy or download the file again")
+                raise InputError(
+                    f"{file}: the geometry of feature {row} is damaged, or a surface of triangles (multipatch, TIN): "
+                    "copy the file again, or convert it, for instance with ogr2ogr -nlt MULTIPOLYGON"
+                )
             closed.append(Repair(int(row), "a ring that is not closed", "repaired"))
     return geometries, closed
