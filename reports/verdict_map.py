@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..evaluators.base import Evaluation
 from ..evaluators.verdict_table import VerdictKind, Verdicts
+from .curves import curve_panels, draw_curves
 from .evaluation_text import described, evaluation_table
 from .format import shortened
 from .map_elements import add_scale_bar, polygon_paths
@@ -25,9 +26,12 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_verdicts", "verdict_figure"]
 
+#: Panels of curves below the table of the indices.
+_MOST_PANELS = 3
+
 
 def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry | None = None) -> Figure:
-    """Return a figure: the map of all verdicts with scale bar and legend, and the index table beside it.
+    """Return a figure: the map of all verdicts with scale bar and legend, beside it the index table and curves.
 
     Footprints that lie in places far apart get a map for each place (the nine with most objects), since on one map
     of all nothing would be seen.
@@ -62,7 +66,12 @@ def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry
         order = [kind.legend for kind in verdicts.kinds if kind.role != "outline"]
         shown = sorted(handles.values(), key=lambda handle: _place(str(handle.get_label()), order))
         left.legend(handles=shown, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
-    _draw_indices(right.subplots(), evaluation)
+    panels = curve_panels(evaluation)[:_MOST_PANELS]
+    heights = [1.0, *(0.35 for _ in panels)]
+    indices, *others = right.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+    _draw_indices(indices, evaluation)
+    for panel, curves in zip(others, panels, strict=True):
+        draw_curves(panel, evaluation, curves)
     return figure
 
 
