@@ -44,6 +44,8 @@ __all__ = [
 
 _TABLES = ("scenes", "detectors", "evaluators")
 _MAX_AXIS = 10_000
+#: Endings of files that are imported, not run on.
+_MEASUREMENTS = (".las", ".laz", ".tif", ".tiff", ".jp2", ".vrt")
 
 
 @dataclass(frozen=True)
@@ -148,9 +150,14 @@ def scenes_of(words: Iterable[str]) -> tuple[SceneRecipe, ...]:
             name, values = parse_selection(word)
             if name not in preset_names():
                 known = [*preset_names(), *suite_names(), *(file.parent.name for file in Path().glob("*/scene.toml"))]
+                if path.suffix.lower() in _MEASUREMENTS:
+                    raise UnknownNameError(
+                        f"{word!r} is a file of measurements and no scene: make a scene folder of it with "
+                        "'roofbench scenes import'"
+                    )
                 raise UnknownNameError(
-                    f"{word!r} is no scene folder, preset or suite{nearest_hint(name, known)}; "
-                    f"the presets are {', '.join(preset_names())}, the suites {', '.join(suite_names())}"
+                    f"{word!r} is no scene folder, preset or suite{nearest_hint(name, known)}: 'roofbench list scenes' "
+                    "and 'roofbench list suites' show what there is"
                 )
             parameters = {key: _number(value) for key, value in values.items()}
             seed = parameters.pop("seed", 1)

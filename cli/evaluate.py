@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from .options import FORMAT_HELP, EvaluatorOption, GsdOption, JoinGapsOption, OverwriteOption, QuietOption
-
-if TYPE_CHECKING:
-    import shapely
-
-    from ..scenes.geodata.footprints import Footprints
 
 __all__ = ["evaluate"]
 
@@ -84,6 +79,7 @@ def evaluate(
     from ..core.errors import InputError, UnsupportedError
     from ..evaluators.registry import ALL, all_evaluators, make_evaluator
     from ..reports.evaluation_text import format_evaluation, format_evaluations
+    from ..scenes.geodata.common_place import place_warnings, reaches
     from ..scenes.geodata.vector_files import read_footprints, read_polygon
 
     chosen: dict[str, Any] = {"matching": matching, "area": area, "gsd": gsd, "minimum_area": minimum_area}
@@ -121,8 +117,9 @@ def evaluate(
                 typer.echo(f"{footprints.source}: {len(footprints.repairs) - 10} more repaired or left out", err=True)
             if not len(footprints):
                 typer.echo(f"{footprints.source}: no footprints", err=True)
-        _warn_of_place(found, truth)
-    if evaluation_area and not any(_reaches(boundary, footprints) for footprints in (found, truth)):
+        for warning in place_warnings(found, truth):
+            typer.echo(warning, err=True)
+    if evaluation_area and not any(reaches(boundary, footprints) for footprints in (found, truth)):
         raise InputError(
             f"{evaluation_area} holds none of the footprints, neither detected nor reference: "
             "check that it shows the same place in the CRS that it names"
@@ -149,36 +146,6 @@ def evaluate(
     typer.echo(
         format_evaluations(results, form, title=title) if every else format_evaluation(result, form, title=title)
     )
-
-
-def _warn_of_place(detected: Footprints, reference: Footprints) -> None:
-    """Say when the two sets cannot be of one place, or when their CRS gives no true areas."""
-    import numpy as np
-    import shapely
-
-    from ..scenes.geodata.crs import scale_warning
-
-    boxes = [shapely.total_bounds(footprints.polygons) for footprints in (detected, reference) if len(footprints)]
-    if not boxes:
-        return
-    low, high = np.max([box[:2] for box in boxes], axis=0), np.min([box[2:] for box in boxes], axis=0)
-    if (low > high).any():
-        ranges = [f"x {box[0]:.0f} to {box[2]:.0f}, y {box[1]:.0f} to {box[3]:.0f}" for box in boxes]
-        typer.echo(
-            f"warning: {detected.source} lies in {ranges[0]} and {reference.source} in {ranges[1]}: no overlap at all, "
-            "check the CRS and the order of the axes",
-            err=True,
-        )
-    stretched = scale_warning(reference.crs or detected.crs, *((boxes[-1][:2] + boxes[-1][2:]) / 2))
-    if stretched:
-        typer.echo(stretched, err=True)
-
-
-def _reaches(area: shapely.Geometry | None, footprints: Footprints) -> bool:
-    """Return whether any footprint meets the area."""
-    import shapely
-
-    return bool(shapely.intersects(area, footprints.polygons).any())
 
 
 def _check_targets(

@@ -13,9 +13,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, Self, cast
 
-from ...core.errors import ParameterError, UnsupportedError
+from ...core.errors import ParameterError, UnknownNameError, UnsupportedError
 from ...core.parameters import parameter_text
-from ...core.registry import Registry
+from ...core.registry import Registry, nearest_hint
 from ...detectors.base import Detector
 from ...detectors.registry import DETECTORS, make_detector
 from ...evaluators.base import Evaluator
@@ -222,6 +222,11 @@ def _open_folder(folder: str) -> Scene:
 
 def _checked_parameters(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return generator parameters as the generator takes them, or raise `ParameterError`."""
+    if name not in preset_names():
+        raise UnknownNameError(
+            f"no preset called {name!r}{nearest_hint(name, preset_names())}: "
+            "'roofbench list scenes' shows what there is"
+        )
     if name != _HAMLET:
         recipe = preset(name, **parameters)
         return {key: getattr(recipe, key) for key in parameters}

@@ -117,6 +117,12 @@ def test_detect_writes_what_a_run_stores(cli, misbehaving):
     [
         (("run", "nosuch.toml"), "nosuch.toml: no such file"),
         (("run", "nosuch"), "is no scene folder, preset or suite"),
+        (("run", "quik"), "did you mean 'quick'"),
+        (("run", "villag"), "did you mean 'village'"),
+        (("detect", "ndsm", "fairfeild", "-o", "x.gpkg"), "did you mean 'fairfield'"),
+        (("detect", "ndsm", "tile.laz", "-o", "x.gpkg"), "roofbench scenes import"),
+        (("scenes", "make", "hamlt", "-o", "x"), "did you mean 'hamlet'"),
+        (("run", "hamlet", "--index", "Q_ll"), "did you mean 'Q_l'"),
         (("run", "hamlet", "-d", "ndms"), "did you mean 'ndsm'"),
         (("run", "hamlet", "-j", 0, "--time-limit", 3), "limits need a worker process"),
         (("run", "hamlet", "--index", "quality"), "has no index 'quality'"),
@@ -132,6 +138,8 @@ def test_detect_writes_what_a_run_stores(cli, misbehaving):
 )
 def test_a_wrong_word_is_one_sentence_and_exit_code_2(cli, words, message, tmp_path):
     (tmp_path / "empty.json").write_text("{}")
+    (tmp_path / "village").mkdir()
+    (tmp_path / "village" / "scene.toml").touch()
     printed = cli(*words, code=2)
     assert message in printed
     assert "\n" not in printed

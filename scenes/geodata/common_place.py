@@ -1,0 +1,33 @@
+"""Whether two footprint sets, or an area and a set, can be of one place."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from .crs import scale_warning
+from .footprints import Footprints
+
+__all__ = ["place_warnings", "reaches"]
+
+
+def place_warnings(detected: Footprints, reference: Footprints) -> list[str]:
+    """Return warnings in words: no overlap of the two extents, or a CRS in which areas are far from true ones."""
+    boxes = [shapely.total_bounds(footprints.polygons) for footprints in (detected, reference) if len(footprints)]
+    if not boxes:
+        return []
+    warnings = []
+    low, high = np.max([box[:2] for box in boxes], axis=0), np.min([box[2:] for box in boxes], axis=0)
+    if (low > high).any():
+        ranges = [f"x {box[0]:.0f} to {box[2]:.0f}, y {box[1]:.0f} to {box[3]:.0f}" for box in boxes]
+        warnings.append(
+            f"warning: {detected.source} lies in {ranges[0]} and {reference.source} in {ranges[1]}: no overlap at all, "
+            "check the CRS and the order of the axes"
+        )
+    stretched = scale_warning(reference.crs or detected.crs, *((boxes[-1][:2] + boxes[-1][2:]) / 2))
+    return [*warnings, stretched] if stretched else warnings
+
+
+def reaches(area: shapely.Geometry | None, footprints: Footprints) -> bool:
+    """Return whether any footprint meets the area."""
+    return bool(shapely.intersects(area, footprints.polygons).any())
