@@ -207,7 +207,7 @@ BAD_INPUT = {
     "pixels without end": (["d.geojson", "r.gpkg", "--area", "pixels", "--gsd", "1e-6"], "at least 0.001 m"),
     "no finite area": (["d.geojson", "r.gpkg", "--minimum-area", "inf"], "must be a finite number"),
     "area elsewhere": (["d.geojson", "r.gpkg", "--evaluation-area", "elsewhere.gpkg"], "holds none of the footprints"),
-    "only NaN": (["d.geojson", "nan.geojson"], "nan.geojson: no polygons"),
+    "only NaN": (["d.geojson", "nan.geojson"], "nan.geojson: the geometry of feature 0 is damaged"),
     "unknown evaluator": (["d.geojson", "r.gpkg", "-e", "treshold-free"], "did you mean 'threshold-free'"),
     "unknown parameter": (["d.geojson", "r.gpkg", "-e", "threshold-free[maching=overlap]"], "did you mean 'matching'"),
     "no gap to join": (["d.geojson", "r.gpkg", "--join-gaps", "0"], "more than 0 and up to 100 m"),
