@@ -1,7 +1,8 @@
 """How the result of the marked point process moves: the tables and figures of docs/results/mpp.md.
 
-Run by hand: ``python tests/performance/study_mpp.py ablation --folders delft,ign`` and the same with ``sensitivity``,
-``points``, ``seeds``, ``ground``, ``detectors``, ``shapes`` or ``pictures``; figures go to docs/images.
+Run by hand: ``python tests/performance/study_mpp.py ablation --folders delft,ign`` and the same with ``readings``,
+``sensitivity``, ``points``, ``seeds``, ``ground``, ``detectors``, ``shapes`` or ``pictures``; figures go to
+docs/images.
 
 Small presets of one or two scene seeds and the real scenes in folders (one chain, or three). Q_l is object quality
 of the buildings, Q_lp pixel quality, both in percent by the threshold-free evaluator (nearest matching, exact areas);
@@ -41,6 +42,32 @@ ABLATIONS = {
     "no test of the mean evidence": "least_evidence=0",
     "buildings": "level=building",
     "blocks": "level=block",
+}
+#: Readings of the print, as docs/results/mpp.md names them.
+_FAR = "heights=above-ground,update=union,least_height=2.5,overlap_share=0.1,prior_limit=3"
+READINGS = {
+    "as printed, 30,000 iterations": "iterations=30000",
+    "as printed, 1,000,000 iterations": "iterations=1000000",
+    "H": "heights=above-ground",
+    "U": "update=union",
+    "O": "overlap_share=0.1",
+    "P": "prior_limit=3",
+    "N": "least_height=2.5",
+    "H, U, N": "heights=above-ground,update=union,least_height=2.5",
+    "H, U, N, O": "heights=above-ground,update=union,least_height=2.5,overlap_share=0.1",
+    "H, U, N, P": "heights=above-ground,update=union,least_height=2.5,prior_limit=3",
+    "H, U, N, O, P": _FAR,
+    "the same without H": f"{_FAR},heights=elevation",
+    "the same without U": f"{_FAR},update=printed",
+    "the same, lambda 100 and as many births as deaths": f"{_FAR},buildings=100,birth_share=0.5",
+    "the same, tau 0.3 ± 0.1 m": f"{_FAR},tau_mean=0.3,tau_spread=0.1",
+    "the same, p_f = 1": f"{_FAR},false_alarm_ratio=1",
+    "the same, p_f = 0.01": f"{_FAR},false_alarm_ratio=0.01",
+    "the same, exp(n/N) counts within one tau": f"{_FAR},match=1",
+    "H, U, N, O, P, T": f"{_FAR},tree_spread=10",
+    "the same, length 30 ± 20, width 15 ± 10 m": (
+        f"{_FAR},tree_spread=10,length_mean=30,length_spread=20,width_mean=15,width_spread=10"
+    ),
 }
 FACTORS = (0.5, 2.0)
 NUMBERS = (
@@ -165,6 +192,21 @@ def draw_sensitivity(rows, names):
     panels[0].set_ylim(-0.5, len(order) - 0.5)
     panels[0].legend(fontsize=8, loc="lower left")
     save(figure, "mpp-sensitivity.png")
+
+
+def readings(_folders):
+    """Print what each reading of the print reaches on two small presets."""
+    scenes = [scene_of(name, 1) for name in ("toronto-a-small", "vaihingen-a-small")]
+    print("\n| reading |" + "".join(f" {scene.name} C_m | C_r | Q_l | Q_lp |" for scene in scenes))
+    print("|---" + "|--:" * 4 * len(scenes) + "|")
+    for label, change in READINGS.items():
+        values = []
+        for scene in scenes:
+            detector = rb.make_detector(f"mpp-printed[iterations=200000,{change}]")
+            result = rb.evaluate(detector.detect(scene.for_detection(), np.random.default_rng(0)), scene.reference)
+            values += [result.object.completeness, result.object.correctness, result.object.quality]
+            values.append(result.pixel.quality)
+        print(f"| {label} | " + " | ".join(f"{100 * (value or 0):.1f}" for value in values) + " |", flush=True)
 
 
 def thinned(density):
@@ -315,6 +357,7 @@ def save(figure, name):
 
 STUDIES = {
     "ablation": ablation,
+    "readings": readings,
     "sensitivity": sensitivity,
     "points": points,
     "seeds": seeds,
