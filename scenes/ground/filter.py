@@ -42,6 +42,10 @@ _NARROW = 6.0
 _GAP = 3.0
 #: Points put on the grid at a time, so that a large cloud is not copied.
 _CHUNK = 2_000_000
+#: Metres within which the step of a smooth surface rises from its foot to its top.
+_SMOOTH_STEP = 4.0
+#: Share of the scene under objects from which the trend is fitted again without them.
+_CROWDED = 0.3
 #: Share of the border of a wide object that must be wall.
 _WALLED = 0.7
 
@@ -51,7 +55,7 @@ def ground_surface(
     extent: Sequence[float],
     *,
     cell: float | None = None,
-    largest_object: float = 100.0,
+    largest_object: float = 130.0,
     slope: float = 0.15,
     wall_height: float = 1.0,
     tolerance: float = 0.4,
@@ -88,6 +92,12 @@ def ground_surface(
     trend = _trend(lowest, grid.gsd, largest_object)
     relief = lowest - trend
     objects = _objects(relief, grid.gsd, largest_object, slope, wall_height)
+    if objects.mean() > _CROWDED:
+        # Roofs that cover most of a neighbourhood lift its trend: the trend of the rest is that of the land. What is
+        # left between them is narrow, so that the feet of smooth steps may not count as ground.
+        trend = _trend(np.where(objects, np.float32(np.nan), lowest), grid.gsd, largest_object)
+        relief = lowest - trend
+        objects = _objects(relief, grid.gsd, largest_object, slope, wall_height, feet=True)
     ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
     # Cut hill tops and the feet of shrubs come back; what they add lets the next round reach a little further.
     for _ in range(2):
@@ -263,8 +273,13 @@ def _local_planes(height: NDArray[np.float64], weight: NDArray[np.float64], sigm
     return np.asarray(mz + across * (x - mx) + down * (y - my))
 
 
-def _objects(relief: _Floats, cell: float, largest: float, slope: float, wall_height: float) -> _Mask:
-    """Return the cells of objects: removed by an opening and, where the window is wide, standing on walls."""
+def _objects(
+    relief: _Floats, cell: float, largest: float, slope: float, wall_height: float, *, feet: bool = False
+) -> _Mask:
+    """Return the cells of objects: removed by an opening and, where the window is wide, standing on walls.
+
+    With `feet`, cells around an object that its step leaves above the ground belong to it.
+    """
     import cv2
 
     objects = np.zeros(relief.shape, dtype=bool)
@@ -274,7 +289,7 @@ def _objects(relief: _Floats, cell: float, largest: float, slope: float, wall_he
     for radius in _radii(largest / 2 / cell, min(relief.shape)):
         if radius * cell > _NARROW and walls is None:
             # Narrower windows have taken the trees off: what steps down in the surface between them is a roof.
-            walls = _wall_cells(surface, wall_height)
+            walls = _wall_cells(surface, wall_height, cell)
         window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * radius + 1, 2 * radius + 1))
         # Windows centred beyond hang over: they would hold a roof's rim and nothing else.
         lowest = cv2.erode(np.where(beyond, np.float32(np.inf), surface), window)
@@ -282,6 +297,8 @@ def _objects(relief: _Floats, cell: float, largest: float, slope: float, wall_he
         removed = ~beyond & (surface - opened > np.minimum(0.3 + slope * radius * cell, 2.0))
         if walls is not None:
             removed = _standing(removed, walls, beyond)
+            if feet:
+                removed |= _foot(removed, surface - opened, cell) & ~beyond
             # The rest of a roof of which a wing is gone stands on the cut, too.
             walls |= cv2.dilate(removed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         objects |= removed
@@ -299,14 +316,39 @@ def _radii(largest: float, size: int) -> list[int]:
         radius = min(radius + max(1.0, radius * 0.41), largest)
 
 
-def _wall_cells(relief: _Floats, height: float) -> _Mask:
-    """Return the cells above a step: the fall within two cells, less half the rise, exceeds `height`.
+def _foot(removed: _Mask, above: _Floats, cell: float) -> _Mask:
+    """Return the cells around an object that a smooth step leaves above the ground."""
+    import cv2
 
-    A steep slope rises as much as it falls; the border of a roof falls to the ground and rises to its ridge at most.
+    reach = 2 * round(_SMOOTH_STEP / 2 / cell) + 1
+    around = cv2.dilate(removed.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))) > 0
+    return np.asarray(around & (above > 0.3))
+
+
+def _wall_cells(relief: _Floats, height: float, cell: float) -> _Mask:
+    """Return the cells above a step, and those around the steps of a smooth surface.
+
+    A cell is above a step when the fall within two cells, less half the rise, exceeds `height`: a steep slope rises as
+    much as it falls; the border of a roof falls to the ground and rises to its ridge at most. Surfaces of image
+    matching and rasters have smooth steps. Within `_SMOOTH_STEP` metres the fall must be higher in proportion, and the
+    border of the object lies at the foot of the step, as far away.
     """
     import cv2
 
-    window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+    walls = _above_step(relief, 2, height)
+    reach = round(_SMOOTH_STEP / cell)
+    if reach > 2:
+        window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+        smooth = _above_step(relief, reach, 0.75 * height * reach)
+        walls |= cv2.dilate(smooth.astype(np.uint8), window) > 0
+    return walls
+
+
+def _above_step(relief: _Floats, reach: int, height: float) -> _Mask:
+    """Return the cells where the fall within `reach` cells, less half the rise, exceeds `height`."""
+    import cv2
+
+    window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     fall = relief - cv2.erode(relief, window)
     rise = cv2.dilate(relief, window) - relief
     return np.asarray(fall - rise / 2 > height)

@@ -165,3 +165,51 @@ def test_ground_points_give_their_mean_per_cell():
     dem = elevation_from_points(points, (0, 0, 3, 1), cell=1.0)
     np.testing.assert_allclose(dem.values[0, :2], [1.5, 7.0])
     assert 1.5 <= dem.values[0, 2] <= 7.0
+
+
+def closed_surface(size, roofs, *, smooth=0.0, relief=0.0):
+    """One point a square metre on a closed surface: no point lies on a wall, and `smooth` (m) blurs the steps."""
+    from scipy.ndimage import gaussian_filter
+
+    rng = np.random.default_rng(7)
+    y, x = np.mgrid[:size, :size] + 0.5
+    truth = relief * np.sin(x / 60) * np.cos(y / 75)
+    surface = truth.copy()
+    inside = np.zeros(truth.shape, dtype=bool)
+    for left, bottom, right, top, height in roofs:
+        roof = (x >= left) & (x < right) & (y >= bottom) & (y < top)
+        surface[roof] += height
+        inside |= roof
+    if smooth:
+        surface = gaussian_filter(surface, smooth)
+    surface += rng.normal(0, 0.05, surface.shape)
+    points = PointCloud(x.ravel(), y.ravel(), surface.ravel())
+    error = ground_surface(points, (0, 0, size, size)).sample(x.ravel(), y.ravel()) - truth.ravel()
+    return error[inside.ravel()], error[~inside.ravel()]
+
+
+BLOCKS = [(20 + 110 * i, 20 + 110 * j, 118 + 110 * i, 118 + 110 * j, 18) for i in range(3) for j in range(3)]
+
+
+@pytest.mark.parametrize("smooth", [0.0, 1.0, 2.0])
+@pytest.mark.parametrize(
+    ("size", "roofs", "relief"),
+    [
+        (360, [(30, 120, 330, 220, 12)], 0.0),
+        (250, [(80, 80, 165, 160, 12)], 0.0),
+        (250, [(80, 80, 165, 160, 12)], 2.0),
+        (370, BLOCKS, 0.0),
+    ],
+    ids=["hall of 300 m x 100 m", "roof of 6 800 m2", "the same on relief", "city blocks on two thirds of the land"],
+)
+def test_wide_roofs_of_closed_surfaces_are_taken_off(size, roofs, relief, smooth):
+    below_roofs, elsewhere = closed_surface(size, roofs, smooth=smooth, relief=relief)
+    assert np.median(below_roofs) < 0.9
+    assert np.abs(below_roofs).max() < 2.5
+    if smooth < 2:
+        assert np.mean(np.abs(elsewhere) > 0.5) < 0.02 + 0.03 * smooth
+
+
+def test_hills_of_closed_surfaces_stay_ground():
+    _, error = closed_surface(400, [], relief=25.0)
+    assert np.abs(error).max() < 0.5
