@@ -1,8 +1,8 @@
 """The catalogue: what there is to choose from, each name with its meaning.
 
 A *kind* is one of detectors, evaluators, suites, scenes and indices. An *entry* is one name of a kind. Entries are
-found where they live: registries of plugins, suites that come with roofbench, presets of the generator, and scene
-folders in the current directory.
+found where they live: registries of plugins, suites that come with roofbench, real scenes inside the
+package, presets of the generator, and scene folders in the current directory.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ..evaluators.base import Evaluator, Index
 from ..evaluators.registry import EVALUATORS, make_evaluator
 from ..scenes import builtin
 from ..scenes.folder import open_scene
+from ..scenes.shipped import shipped_folder, shipped_names
 from ..scenes.synthetic.presets import preset
 from .identity.recipes import preset_names
 from .suite import Suite, named_suite, suite_names
@@ -78,7 +79,8 @@ def entries(kind: Kind) -> list[Entry]:
         return [_suite_entry(name) for name in suite_names()]
     if kind == "scenes":
         folders = sorted(file.parent for file in Path().glob("*/scene.toml"))
-        return [*(_preset_entry(name) for name in preset_names()), *map(_folder_entry, folders)]
+        shipped = [_shipped_entry(name) for name in shipped_names()]
+        return [*shipped, *(_preset_entry(name) for name in preset_names()), *map(_folder_entry, folders)]
     return [_index_entry(name, index) for name in EVALUATORS.names() for index in EVALUATORS.get(name).indices]
 
 
@@ -105,6 +107,8 @@ def entry_of(name: str) -> Entry:
         return _preset_entry(word)
     if (Path(word) / "scene.toml").is_file():
         return _folder_entry(Path(word))
+    if word in shipped_names():
+        return _shipped_entry(word)
     indices = entries("indices")
     for entry in indices:
         if word in (entry.name, entry.facts["symbol"]):
@@ -217,7 +221,7 @@ def _suite_entry(name: str) -> Entry:
         if not line.startswith("#"):
             break
         comment.append(line.lstrip("# "))
-    description = " ".join(comment)
+    description = " ".join(filter(None, comment))
     return Entry(
         kind="suites",
         name=name,
@@ -267,6 +271,20 @@ def _folder_entry(folder: Path) -> Entry:
         meaning=f"scene folder with {', '.join(scene.contents)}",
         facts={"extent": f"{xmax - xmin:.0f} x {ymax - ymin:.0f} m", "image": "", "spacing": ""},
         example=f"roofbench scenes check {folder}",
+    )
+
+
+def _shipped_entry(name: str) -> Entry:
+    folder = shipped_folder(name)
+    assert folder is not None
+    scene = open_scene(folder)
+    found = _folder_entry(folder)
+    return replace(
+        found,
+        name=name,
+        meaning=f"real scene that comes with roofbench: {', '.join(scene.contents)}",
+        description=f"{scene.facts['source']}. Licence: {scene.facts['licence']}.",
+        example=f"roofbench run {name}",
     )
 
 

@@ -26,12 +26,14 @@ from .suite import DetectorEntry, Suite, scenes_of, suite_of_scenes, suite_of_wo
 __all__ = ["detect", "run"]
 
 
-def detect(scene: Scene, detector: str | Detector, *, seed: int = 0, **parameters: Any) -> Footprints:
+def detect(scene: Scene | str | Path, detector: str | Detector, *, seed: int = 0, **parameters: Any) -> Footprints:
     """Return the footprints that a detector finds on a scene.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene, path or str
+        A scene, a scene folder, a scene that comes with roofbench (``"delft"``), or a preset such as
+        ``"knox-small[seed=3]"``.
     detector : str or Detector
         Name, ``name[parameter=value]``, ``file.py:Class``, or a detector.
     seed : int
@@ -48,7 +50,8 @@ def detect(scene: Scene, detector: str | Detector, *, seed: int = 0, **parameter
     InputError
         The detector returned what is no set of footprints of this scene.
     """
-    return _detect(scene, make_detector(detector, parameters), seed=seed)
+    place = scene if isinstance(scene, Scene) else scenes_of([str(scene)])[0].open()
+    return _detect(place, make_detector(detector, parameters), seed=seed)
 
 
 def run(
@@ -67,8 +70,8 @@ def run(
     Parameters
     ----------
     scenes : str, Suite, or iterable of Scene, path or str
-        A suite by its name or TOML file; or scene objects, scene folders and presets such as
-        ``"knox-small[seed=3]"``.
+        A suite by its name or TOML file; or scene objects, scene folders, names of scenes that come with roofbench
+        and presets such as ``"knox-small[seed=3]"``.
     detectors : iterable of str or Detector, optional
         By default those of the suite, or every detector that needs no parameter.
     evaluator : str or Evaluator, optional

@@ -5,7 +5,8 @@ Nouns
 suite
     Named scenes, detectors and evaluators; every detector runs on every scene.
 scene entry
-    A folder (``path``), or a preset of the generator with ``seeds`` and parameters, of which a list is a sweep axis.
+    A folder (``path``), a real scene that comes with roofbench (``name``), or a preset of the generator with ``seeds``
+    and parameters, of which a list is a sweep axis.
 detector entry
     A detector with parameters and the seeds of its random streams.
 """
@@ -29,6 +30,7 @@ from ..detectors.registry import DETECTORS, make_detector
 from ..evaluators.base import Evaluator
 from ..evaluators.registry import make_evaluator
 from ..scenes.scene import Scene
+from ..scenes.shipped import shipped_names
 from .identity.recipes import SceneRecipe, label_of, preset_names
 
 __all__ = [
@@ -144,19 +146,22 @@ def scenes_of(words: Iterable[str]) -> tuple[SceneRecipe, ...]:
     recipes: dict[str, SceneRecipe] = {}
     for word in words:
         path = Path(word)
-        if path.is_dir():
+        if path.is_dir() and (word not in shipped_names() or (path / "scene.toml").is_file()):
             recipe = SceneRecipe.of_folder(path)
+        elif word in shipped_names():
+            recipe = SceneRecipe.of_shipped(word)
         else:
             name, values = parse_selection(word)
             if name not in preset_names():
-                known = [*preset_names(), *suite_names(), *(file.parent.name for file in Path().glob("*/scene.toml"))]
+                known = [*shipped_names(), *preset_names(), *suite_names()]
+                known += (file.parent.name for file in Path().glob("*/scene.toml"))
                 if path.suffix.lower() in _MEASUREMENTS:
                     raise UnknownNameError(
                         f"{word!r} is a file of measurements and no scene: make a scene folder of it with "
                         "'roofbench scenes import'"
                     )
                 raise UnknownNameError(
-                    f"{word!r} is no scene folder, preset or suite{nearest_hint(name, known)}: 'roofbench list scenes' "
+                    f"{word!r} is no scene, preset or suite{nearest_hint(name, known)}: 'roofbench list scenes' "
                     "and 'roofbench list suites' show what there is"
                 )
             parameters = {key: _number(value) for key, value in values.items()}
@@ -302,16 +307,19 @@ def _parse(text: str, *, source: str, folder: Path, default_name: str) -> Suite:
 
 
 def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> Iterator[SceneRecipe]:
-    if ("path" in entry) == ("preset" in entry):
-        raise places.error("give a path or a preset, one of them,", "scenes", number)
-    if "path" in entry:
+    sources = [key for key in ("path", "name", "preset") if key in entry]
+    if len(sources) != 1:
+        raise places.error("give a path, a name or a preset, one of them,", "scenes", number)
+    (source,) = sources
+    if source != "preset":
         for key in entry:
-            if key != "path":
-                raise places.error(f"{key!r} is not allowed for a scene with a path", "scenes", number, key)
+            if key != source:
+                raise places.error(f"{key!r} is not allowed for a scene with a {source}", "scenes", number, key)
         try:
-            yield SceneRecipe.of_folder(folder / str(entry["path"]))
+            value = str(entry[source])
+            yield SceneRecipe.of_folder(folder / value) if source == "path" else SceneRecipe.of_shipped(value)
         except RoofbenchError as error:
-            raise places.error(str(error), "scenes", number, "path") from error
+            raise places.error(str(error), "scenes", number, source) from error
         return
     preset = entry["preset"]
     if preset not in preset_names():

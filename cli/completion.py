@@ -54,11 +54,13 @@ def suites(incomplete: str) -> list[str]:
 
 
 def suites_and_scenes(incomplete: str) -> list[str]:
-    """Return the suites, presets and scene folders that start so."""
+    """Return the suites, scenes, presets and scene folders that start so."""
     from pathlib import Path
 
+    from ..scenes.shipped import shipped_names
+
     folders = sorted(file.parent.name for file in Path().glob("*/scene.toml"))
-    return [*suites(incomplete), *presets(incomplete), *_starting(folders, incomplete)]
+    return [*suites(incomplete), *presets(incomplete), *_starting([*shipped_names(), *folders], incomplete)]
 
 
 def _starting(names: Iterable[str], incomplete: str) -> list[str]:

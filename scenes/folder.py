@@ -27,11 +27,13 @@ import shapely
 
 from ..core.errors import CRSError, InputError
 from ..core.output import whole_folder
+from ..core.registry import nearest_hint
 from .geodata.crs import require_metric
 from .geodata.footprints import Footprints
 from .geodata.points import PointCloud
 from .geodata.raster import Elevation, Image
 from .scene import Scene
+from .shipped import shipped_names, shipped_or_given
 
 __all__ = [
     "FILES",
@@ -54,7 +56,18 @@ FILES: Mapping[str, str] = {
     "area": "area.gpkg",
 }
 #: Names in a scene folder, with the side files that a GIS leaves: a folder with any other is not replaced.
-SCENE_FILES = (MANIFEST, *FILES.values(), "*.aux.xml", "*.ovr", "*.qmd", "*.qml", "*.gpkg-wal", "*.gpkg-shm", "*.lax")
+SCENE_FILES = (
+    MANIFEST,
+    *FILES.values(),
+    "*.aux.xml",
+    "*.ovr",
+    "*.qmd",
+    "*.qml",
+    "*.gpkg-wal",
+    "*.gpkg-shm",
+    "*.lax",
+    "LICENCE.txt",
+)
 #: Version of the layout; raised when a folder of before cannot be read any more.
 _FORMAT = 1
 
@@ -65,7 +78,7 @@ def open_scene(path: str | os.PathLike[str]) -> Scene:
     Parameters
     ----------
     path : path
-        The folder, or its ``scene.toml``.
+        The folder, its ``scene.toml``, or the name of a scene that comes with roofbench (see `scenes.shipped`).
 
     Raises
     ------
@@ -123,11 +136,14 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, overwrite: bool = 
 
 def read_manifest(path: str | os.PathLike[str]) -> tuple[Path, dict[str, Any]]:
     """Return the folder and the checked content of its ``scene.toml``."""
-    given = Path(path)
+    given = shipped_or_given(path)
     folder = given.parent if given.name == MANIFEST else given
     file = folder / MANIFEST
     if not folder.exists():
-        raise InputError(f"{folder}: no such folder; make a scene with roofbench scenes import or scenes make")
+        raise InputError(
+            f"{folder}: no such folder{nearest_hint(str(folder), shipped_names())}; make a scene with roofbench scenes "
+            f"import or scenes make, or name one that comes with roofbench: {', '.join(shipped_names())}"
+        )
     if not file.is_file():
         raise InputError(
             f"{folder} is not a scene: there is no {MANIFEST} in it; make one with roofbench scenes import"

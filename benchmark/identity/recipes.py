@@ -23,6 +23,7 @@ from ...evaluators.registry import EVALUATORS, make_evaluator
 from ...scenes.builtin import hamlet
 from ...scenes.folder import open_scene
 from ...scenes.scene import Scene
+from ...scenes.shipped import shipped_folder, shipped_names
 from ...scenes.synthetic import make_scene
 from ...scenes.synthetic.presets import preset
 from ...scenes.synthetic.presets import preset_names as generator_presets
@@ -97,13 +98,13 @@ class SceneRecipe:
 
     Attributes
     ----------
-    kind : {"folder", "preset", "builtin", "spooled", "memory"}
-        ``spooled`` is a scene of this process that was written to a file for other processes; ``memory`` one that
-        stays in this process.
+    kind : {"folder", "shipped", "preset", "builtin", "spooled", "memory"}
+        ``shipped`` is a real scene that comes with roofbench; ``spooled`` is a scene of this process that was written
+        to a file for other processes; ``memory`` one that stays in this process.
     name : str
         Name in tables: ``knox-small-3[tree_density=40]``.
     place : str
-        Folder, preset or file.
+        Folder, name of a shipped scene, preset or file.
     seed : int
         Of a preset and of the built-in scene.
     parameters : mapping
@@ -112,7 +113,7 @@ class SceneRecipe:
         Of a scene in memory or spooled, else empty.
     """
 
-    kind: Literal["folder", "preset", "builtin", "spooled", "memory"]
+    kind: Literal["folder", "shipped", "preset", "builtin", "spooled", "memory"]
     name: str
     place: str
     seed: int = 0
@@ -124,6 +125,22 @@ class SceneRecipe:
         """Return the recipe of a scene folder; its manifest is read for the name."""
         path = Path(folder).resolve()
         return cls("folder", _open_folder(str(path)).name, str(path))
+
+    @classmethod
+    def of_shipped(cls, name: str) -> Self:
+        """Return the recipe of a real scene that comes with roofbench.
+
+        Raises
+        ------
+        UnknownNameError
+            No such scene; the nearest name is given.
+        """
+        if name not in shipped_names():
+            raise UnknownNameError(
+                f"no scene called {name!r} comes with roofbench{nearest_hint(name, shipped_names())}; there are "
+                f"{', '.join(shipped_names())}"
+            )
+        return cls("shipped", name, name)
 
     @classmethod
     def of_preset(cls, name: str, *, seed: int, parameters: Mapping[str, Any] | None = None) -> Self:
@@ -147,17 +164,24 @@ class SceneRecipe:
 
     @property
     def word(self) -> str:
-        """The scene on the command line: its folder, or ``preset[seed=3,tree_density=40]``."""
+        """The scene on the command line: its folder or name, or ``preset[seed=3,tree_density=40]``."""
         if self.kind in ("preset", "builtin"):
             values = {"seed": self.seed, **self.parameters}
             return f"{self.place}[{','.join(f'{name}={value}' for name, value in values.items())}]"
         return self.place if self.kind == "folder" else self.name
 
     @property
+    def _folder(self) -> str | None:
+        """Folder of the scene; None where it has none."""
+        if self.kind == "shipped":
+            return str(shipped_folder(self.place) or self.place)
+        return self.place if self.kind == "folder" else None
+
+    @property
     def contents(self) -> tuple[str, ...] | None:
         """The kinds of data of the scene (``points``, ``image``, ...) without reading them; None where not known."""
-        if self.kind == "folder":
-            return _open_folder(self.place).contents
+        if self._folder is not None:
+            return _open_folder(self._folder).contents
         if self.kind == "preset":
             image = () if preset(self.place, **self.parameters).bands == "none" else ("image",)
             return ("points", "dem", "reference", *image)
@@ -182,12 +206,12 @@ class SceneRecipe:
         if self.kind == "preset":
             values = preset(self.place, **self.parameters).values()
             return digest([self.name, module_closure(_GENERATOR).digest, values, self.seed])
-        return digest([self.name, self.content_hash or _open_folder(self.place).content_hash])
+        return digest([self.name, self.content_hash or _open_folder(self._folder or self.place).content_hash])
 
     def open(self) -> Scene:
         """Return the scene."""
-        if self.kind == "folder":
-            return _open_folder(self.place)
+        if self._folder is not None:
+            return _open_folder(self._folder)
         if self.kind == "builtin":
             return hamlet(self.seed)
         if self.kind == "spooled":

@@ -90,10 +90,26 @@ def test_the_group_of_a_scene_is_its_preset_even_where_that_has_a_number():
 def test_words_name_scenes():
     (scene,) = scenes_of(["hamlet[seed=3]"])
     assert (scene.name, scene.seed, scene.word) == ("hamlet-3", 3, "hamlet[seed=3]")
-    with pytest.raises(RoofbenchError, match=r"'hamet' is no scene folder, preset or suite \(did you mean 'hamlet'"):
+    (real,) = scenes_of(["delft"])
+    assert (real.name, real.word, real.group, real.contents) == ("delft", "delft", "delft", real.open().contents)
+    with pytest.raises(RoofbenchError, match=r"'hamet' is no scene, preset or suite \(did you mean 'hamlet'"):
         scenes_of(["hamet"])
 
 
 @pytest.mark.parametrize("name", suite_names())
 def test_suites_that_come_with_roofbench_can_be_read(name):
     assert named_suite(name).scenes
+
+
+def test_the_quick_suite_has_two_real_scenes_and_names_its_detectors():
+    quick = named_suite("quick")
+    assert [scene.name for scene in quick.scenes[:2]] == ["delft", "ign"]
+    assert [scene.kind for scene in quick.scenes] == ["shipped"] * 2 + ["preset"] * 4
+    assert [entry.label for entry in quick.detectors] == ["ndsm", "original", "improved", "mpp"]
+
+
+def test_a_scene_that_comes_with_roofbench_is_named_in_a_suite(suite_file):
+    suite = read_suite(suite_file(GOOD.replace('preset = "hamlet"', 'name = "delft"').replace("seeds = [4, 7]\n", "")))
+    assert [scene.word for scene in suite.scenes] == ["delft"]
+    with pytest.raises(RoofbenchError, match=r"line 4: no scene called 'delf' comes with roofbench .*'delft'"):
+        read_suite(suite_file(GOOD.replace('preset = "hamlet"', 'name = "delf"').replace("seeds = [4, 7]\n", "")))

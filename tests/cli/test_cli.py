@@ -116,7 +116,7 @@ def test_detect_writes_what_a_run_stores(cli, misbehaving):
     ("words", "message"),
     [
         (("run", "nosuch.toml"), "nosuch.toml: no such file"),
-        (("run", "nosuch"), "is no scene folder, preset or suite"),
+        (("run", "nosuch"), "is no scene, preset or suite"),
         (("run", "quik"), "did you mean 'quick'"),
         (("run", "villag"), "did you mean 'village'"),
         (("detect", "ndsm", "fairfeild", "-o", "x.gpkg"), "did you mean 'fairfield'"),
