@@ -19,7 +19,7 @@ from ..core.registry import nearest_hint, parse_selection
 from ..detectors.base import Detector
 from ..detectors.registry import DETECTORS, make_detector
 from ..evaluators.base import Evaluator, Index
-from ..evaluators.registry import EVALUATORS, make_evaluator
+from ..evaluators.registry import DEFAULT, EVALUATORS, make_evaluator
 from ..scenes import builtin
 from ..scenes.folder import open_scene
 from ..scenes.shipped import shipped_folder, shipped_names
@@ -69,7 +69,8 @@ class Entry:
 def entries(kind: Kind) -> list[Entry]:
     """Return the entries of a kind, in alphabetical order; indices in the order of their evaluator.
 
-    A plugin that cannot be made without parameters, or whose packages are missing, is listed with that reason.
+    Indices of the default evaluator come first. A plugin that cannot be made without parameters, or whose
+    packages are missing, is listed with that reason.
     """
     if kind == "detectors":
         return [_plugin_entry(name, detector=True) for name in DETECTORS.names()]
@@ -81,7 +82,9 @@ def entries(kind: Kind) -> list[Entry]:
         folders = sorted(file.parent for file in Path().glob("*/scene.toml"))
         shipped = [_shipped_entry(name) for name in shipped_names()]
         return [*shipped, *(_preset_entry(name) for name in preset_names()), *map(_folder_entry, folders)]
-    return [_index_entry(name, index) for name in EVALUATORS.names() for index in EVALUATORS.get(name).indices]
+    # A key that several evaluators declare means the one of the default evaluator.
+    names = sorted(EVALUATORS.names(), key=lambda name: name != DEFAULT)
+    return [_index_entry(name, index) for name in names for index in EVALUATORS.get(name).indices]
 
 
 def entry_of(name: str) -> Entry:
