@@ -27,7 +27,7 @@ from ..scenes.synthetic.presets import preset
 from .identity.recipes import preset_names
 from .suite import Suite, named_suite, suite_names
 
-__all__ = ["KINDS", "Entry", "Kind", "entries", "entry_of", "find_plugin"]
+__all__ = ["KINDS", "Entry", "Kind", "entries", "entries_of", "find_plugin"]
 
 Kind: TypeAlias = Literal["detectors", "evaluators", "suites", "scenes", "indices"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -82,13 +82,13 @@ def entries(kind: Kind) -> list[Entry]:
         folders = sorted(file.parent for file in Path().glob("*/scene.toml"))
         shipped = [_shipped_entry(name) for name in shipped_names()]
         return [*shipped, *(_preset_entry(name) for name in preset_names()), *map(_folder_entry, folders)]
-    # A key that several evaluators declare means the one of the default evaluator.
+    # Indices of the default evaluator first.
     names = sorted(EVALUATORS.names(), key=lambda name: name != DEFAULT)
     return [_index_entry(name, index) for name in names for index in EVALUATORS.get(name).indices]
 
 
-def entry_of(name: str) -> Entry:
-    """Return the entry of a name, whichever kind it is.
+def entries_of(name: str) -> list[Entry]:
+    """Return the entries of a name, whichever kind it is; an index may belong to several evaluators.
 
     Parameters
     ----------
@@ -103,19 +103,19 @@ def entry_of(name: str) -> Entry:
     word = name if ".py" in name else parse_selection(name)[0]
     if ".py" in word or word in DETECTORS.names() or word in EVALUATORS.names():
         plugin = find_plugin(name)
-        return _described(plugin, name=name if ".py" in word else word)
+        return [_described(plugin, name=name if ".py" in word else word)]
     if word in suite_names():
-        return _suite_entry(word)
+        return [_suite_entry(word)]
     if word in preset_names():
-        return _preset_entry(word)
+        return [_preset_entry(word)]
     if (Path(word) / "scene.toml").is_file():
-        return _folder_entry(Path(word))
+        return [_folder_entry(Path(word))]
     if word in shipped_names():
-        return _shipped_entry(word)
+        return [_shipped_entry(word)]
     indices = entries("indices")
-    for entry in indices:
-        if word in (entry.name, entry.facts["symbol"]):
-            return entry
+    found = [entry for entry in indices if word in (entry.name, entry.facts["symbol"])]
+    if found:
+        return found
     known = [entry.name for kind in KINDS[:-1] for entry in entries(kind)]
     known += [text for entry in indices for text in (entry.name, entry.facts["symbol"]) if text]
     raise UnknownNameError(

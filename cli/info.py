@@ -26,8 +26,9 @@ def info(
     plugin: PluginOption = None,
 ) -> None:
     """Explain a detector, evaluator, suite, scene or index: parameters, inputs, source and an example."""
-    from ..benchmark.catalogue import entry_of
+    from ..benchmark.catalogue import entries_of
     from ..reports.catalogue_text import format_entry
 
     load_plugins(plugin)
-    typer.echo(format_entry(entry_of(name), table_console().width))
+    width = table_console().width
+    typer.echo("\n\n".join(format_entry(entry, width) for entry in entries_of(name)))

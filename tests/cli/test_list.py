@@ -6,7 +6,7 @@ import pytest
 from harness.command_line import roofbench
 
 import roofbench as rb
-from roofbench.benchmark.catalogue import KINDS, entries, entry_of
+from roofbench.benchmark.catalogue import KINDS, entries, entries_of
 from roofbench.core.errors import UnknownNameError
 from roofbench.scenes.builtin import hamlet
 
@@ -27,7 +27,7 @@ def test_every_entry_has_a_name_and_a_meaning_in_one_line(kind, tmp_path, monkey
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_listed_can_be_explained(kind):
     for entry in entries(kind):
-        assert entry_of(entry.name).name == entry.name
+        assert entry.name in [found.name for found in entries_of(entry.name)]
 
 
 def test_a_list_can_be_read_by_programs(tmp_path):
@@ -65,13 +65,17 @@ def test_an_index_is_explained_by_key_and_by_symbol(name, tmp_path):
     assert "quality: TP/(TP+FP+FN)" in roofbench("info", name, folder=tmp_path).stdout
 
 
+def test_an_index_of_two_evaluators_is_explained_for_both():
+    assert {entry.facts["evaluator"] for entry in entries_of("object.quality")} >= {"threshold-free", "rutzinger"}
+
+
 @pytest.mark.parametrize(
     ("name", "nearest"),
     [("ndms", "ndsm"), ("quik", "quick"), ("fairfeild", "fairfield"), ("object.qualty", "object.quality")],
 )
 def test_a_name_that_does_not_exist_is_answered_with_the_nearest(name, nearest):
     with pytest.raises(UnknownNameError, match=f"did you mean '{nearest}'"):
-        entry_of(name)
+        entries_of(name)
 
 
 def test_a_plugin_of_a_file_is_explained(misbehaving, tmp_path):
