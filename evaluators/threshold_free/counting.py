@@ -85,6 +85,8 @@ def measure_areas(graph: ObjectGraph, *, area: shapely.Geometry | None, lattice:
         detected, reference = clipped(detected, area), clipped(reference, area)
         shared = shared_areas(detected, reference, *pairs)
         within = remeasured(detected, within[0]), remeasured(reference, within[1])
+    # Rounding may make the shared area larger than the smaller outline, and errors of pairs negative.
+    shared = np.minimum(shared, np.minimum(detected.areas[pairs[0]], reference.areas[pairs[1]]))
     if lattice is not None:
         return pixel_areas(
             detected.polygons,

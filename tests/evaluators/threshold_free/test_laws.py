@@ -233,3 +233,13 @@ def test_a_perfect_scene_and_an_empty_one_count_rightly_in_the_mean():
     means = mean_values([evaluate(house, house), evaluate([], house), evaluate([], [])])
     assert means["object.completeness"] == (0.5, 2)
     assert means["object.correctness"] == (1.0, 1)
+
+
+@pytest.mark.parametrize("corners", [90, 360, 1440])
+def test_errors_of_pairs_are_never_negative_where_the_detection_covers_its_reference(corners):
+    centre = shapely.Point(500_020, 5_500_020)
+    reference = centre.buffer(10, quad_segs=corners // 8)
+    for pair in ((centre.buffer(10, quad_segs=corners), reference), (reference, reference)):
+        evaluation = evaluate(*[[polygon] for polygon in pair])
+        assert 0 <= evaluation.pixel.area_omission_error_matched < 1e-9
+        assert evaluation.pixel.area_commission_error_matched >= 0
