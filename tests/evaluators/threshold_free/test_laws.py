@@ -238,7 +238,7 @@ def test_a_perfect_scene_and_an_empty_one_count_rightly_in_the_mean():
 @pytest.mark.parametrize("corners", [90, 360, 1440])
 def test_errors_of_pairs_are_never_negative_where_the_detection_covers_its_reference(corners):
     centre = shapely.Point(500_020, 5_500_020)
-    reference = centre.buffer(10, quad_segs=corners // 8)
+    reference = centre.buffer(10, quad_segs=corners // 6)
     for pair in ((centre.buffer(10, quad_segs=corners), reference), (reference, reference)):
         evaluation = evaluate(*[[polygon] for polygon in pair])
         assert 0 <= evaluation.pixel.area_omission_error_matched < 1e-9
