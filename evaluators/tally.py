@@ -68,7 +68,8 @@ class Histogram:
     def of(cls, values: ArrayLike, *, low: float, high: float, bins: int) -> Self:
         """Count values; NaN is not counted."""
         array = np.asarray(values, dtype=np.float64).ravel()
-        array = array[~np.isnan(array)]
+        # Sorted, so that the last bits of the sums do not depend on the order of the values.
+        array = np.sort(array[~np.isnan(array)])
         place = np.clip(np.floor(np.round((array - low) / (high - low) * bins, 9)), 0, bins - 1).astype(np.int64)
         sums: NDArray[np.float64] = np.bincount(place, weights=array, minlength=bins).astype(np.float64)
         return cls(low, high, np.bincount(place, minlength=bins), sums)

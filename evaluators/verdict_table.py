@@ -18,10 +18,10 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,17 @@ from ..scenes.geodata.footprints import Footprints
 if TYPE_CHECKING:
     import geopandas as gpd
 
-__all__ = ["SIDES", "ColourRole", "CountsAs", "Measure", "Side", "VerdictKind", "VerdictTable", "Verdicts"]
+__all__ = [
+    "SIDES",
+    "ColourRole",
+    "CountsAs",
+    "LazyReasons",
+    "Measure",
+    "Side",
+    "VerdictKind",
+    "VerdictTable",
+    "Verdicts",
+]
 
 Side: TypeAlias = Literal["detection", "reference"]
 SIDES: tuple[Side, Side] = ("detection", "reference")
@@ -41,6 +51,8 @@ ColourRole: TypeAlias = Literal["correct", "partial", "excess", "missing", "left
 #: Effect on rates: ``duplicate`` is shown among the errors and enters no rate, ``neutral`` is in neither.
 CountsAs: TypeAlias = Literal["correct", "wrong", "duplicate", "neutral"]
 
+#: Rows whose reasons are written at a time.
+_STRETCH = 1 << 16
 _MAGIC = b"roofbench-verdicts-1\n"
 _LONGEST_HEADER = 1 << 16
 _MOST_BYTES = 1 << 34
@@ -95,6 +107,46 @@ class Measure:
         return _DECIMALS.get(self.unit, 3)
 
 
+class LazyReasons(Sequence[str]):
+    """Reasons in words that are written only when they are asked for, a stretch of rows at a time.
+
+    A city has a million of them, and most evaluations are never asked.
+
+    Parameters
+    ----------
+    count : int
+        Number of rows.
+    words : callable
+        Takes a slice of rows with start and stop, and returns their reasons.
+    """
+
+    def __init__(self, count: int, words: Callable[[slice], NDArray[np.object_]]) -> None:
+        self._count, self._words = count, words
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[str]: ...
+
+    def __getitem__(self, index: int | slice) -> str | list[str]:
+        if isinstance(index, slice):
+            start, stop, step = index.indices(self._count)
+            if step == 1:
+                texts: list[str] = self._words(slice(start, max(start, stop))).tolist()
+                return texts
+            return [self[row] for row in range(start, stop, step)]
+        row = range(self._count)[index]
+        return str(self._words(slice(row, row + 1))[0])
+
+    def __iter__(self) -> Iterator[str]:
+        for start in range(0, self._count, _STRETCH):
+            yield from self[start : start + _STRETCH]
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class VerdictTable:
     """The verdicts of one side, one row per object in the order of the footprints.
@@ -111,8 +163,8 @@ class VerdictTable:
         Id of the partner on the other side, or of the object that comes closest to one; -1 without any.
     measures : mapping of str to ndarray of float64, shape (n,)
         NaN where undefined.
-    reasons : tuple of str
-        Why, in words.
+    reasons : sequence of str
+        Why, in words: a tuple, or `LazyReasons` that are written when they are asked for.
 
     Examples
     --------
@@ -127,7 +179,7 @@ class VerdictTable:
     kind: NDArray[np.uint8]
     partner: NDArray[np.int64]
     measures: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    reasons: tuple[str, ...]
+    reasons: Sequence[str]
 
     def __post_init__(self) -> None:
         lengths = {len(self.ids), len(self.kind), len(self.partner), len(self.reasons)}

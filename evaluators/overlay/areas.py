@@ -16,8 +16,9 @@ of overlaps.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial, reduce
 from typing import TypeAlias
 
 import numpy as np
@@ -26,11 +27,18 @@ from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
 from ..tally import Tallies
-from .convex import convex_intersection_areas
-from .overlaps import Overlaps, common_ground, quadrilateral_rows
+from .exact_sum import exact_sum
+from .groups import Members, connected_groups
+from .overlaps import Overlaps
+from .polygon_overlay import common_ground
 
-__all__ = ["AreaTally", "exact_areas", "mask_areas"]
+__all__ = ["AreaTally", "UnionAreas", "exact_areas", "mask_areas", "tally_areas"]
 
+#: From so many members on, or in so large a group, union areas come from compiled code, which takes a moment to load.
+_MANY_MEMBERS, _LARGE_GROUP = 5_000, 100
+
+#: Union areas of groups, by kind and members: see `tally_areas`.
+UnionAreas: TypeAlias = Callable[[str, Members], NDArray[np.float64]]
 #: Pairs (first, second) of members that share area, and how much, m2.
 _Conflicts: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
@@ -65,11 +73,34 @@ def exact_areas(
     false_negatives: NDArray[np.int64],
     within: tuple[Overlaps, Overlaps],
 ) -> AreaTally:
+    """Return T, F and M of footprints; see `tally_areas`."""
+    return tally_areas(
+        (detected.areas, reference.areas),
+        pairs,
+        shared,
+        false_positives=false_positives,
+        false_negatives=false_negatives,
+        within=within,
+        united=partial(_united, detected, reference),
+    )
+
+
+def tally_areas(
+    sizes: tuple[NDArray[np.float64], NDArray[np.float64]],
+    pairs: tuple[NDArray[np.int64], NDArray[np.int64]],
+    shared: NDArray[np.float64],
+    *,
+    false_positives: NDArray[np.int64],
+    false_negatives: NDArray[np.int64],
+    within: tuple[Overlaps, Overlaps],
+    united: UnionAreas,
+) -> AreaTally:
     """Return T, F and M.
 
     Parameters
     ----------
-    detected, reference : Footprints
+    sizes : tuple of ndarray
+        Area of each detection and of each reference, m2.
     pairs : tuple of ndarray of int64, shape (n,)
         Rows (detections, references) of the TP pairs.
     shared : ndarray, shape (n,)
@@ -78,26 +109,32 @@ def exact_areas(
         Rows of the FP detections and of the FN references.
     within : tuple of Overlaps
         Pairs of detections, and pairs of references, that share any area.
+    united : callable
+        Takes ``"pairs"``, ``"detected"`` or ``"reference"`` and `Members` of that kind, and returns the area of the
+        union of each group. A member of kind ``"pairs"`` is what a detection and a reference share.
+
+    Notes
+    -----
+    All sums are exact and rounded once, so the result does not depend on the order of the footprints.
     """
-    detections, references = pairs
+    # Rounding may make the shared area larger than the smaller outline, and errors of pairs negative.
+    shared = np.minimum(shared, np.minimum(sizes[0][pairs[0]], sizes[1][pairs[1]]))
     conflicts = (
-        _counted(within[0], detections, false_positives, len(detected)),
-        _counted(within[1], references, false_negatives, len(reference)),
+        _counted(within[0], pairs[0], false_positives, len(sizes[0])),
+        _counted(within[1], pairs[1], false_negatives, len(sizes[1])),
     )
-    pair_conflicts = _pair_conflicts(detected, reference, pairs, conflicts)
-
-    def pair_ground(group: list[int]) -> NDArray[np.object_]:
-        return common_ground(detected.polygons[detections[group]], reference.polygons[references[group]])
-
-    true_positive = _union_area(shared, pair_conflicts, pair_ground)
+    links = _pair_links(pairs, (len(sizes[0]), len(sizes[1])), conflicts)
+    start, nodes = connected_groups(*links)
+    alone = np.ones(len(shared), dtype=bool)
+    alone[nodes] = False
+    ground = united("pairs", Members(start, pairs[0][nodes], pairs[1][nodes]))
+    true_positive = exact_sum(shared[alone], ground)
     beyond = []
-    for footprints, own, unmatched, conflict in (
-        (detected, detections, false_positives, conflicts[0]),
-        (reference, references, false_negatives, conflicts[1]),
+    for kind, areas, own, unmatched, conflict in (
+        ("detected", sizes[0], pairs[0], false_positives, conflicts[0]),
+        ("reference", sizes[1], pairs[1], false_negatives, conflicts[1]),
     ):
-        areas = np.zeros(len(footprints))
-        areas[own], areas[unmatched] = footprints.areas[own], footprints.areas[unmatched]
-        whole = _union_area(areas, conflict, footprints.polygons.__getitem__)
+        whole = _union_area(areas, np.concatenate([own, unmatched]), conflict, partial(united, kind))
         # Equal sets leave nothing, whatever the rounding of the sums.
         rest = whole - true_positive
         beyond.append(rest if rest > 1e-13 * whole else 0.0)
@@ -105,9 +142,9 @@ def exact_areas(
         true_positive=true_positive,
         false_positive=beyond[0],
         false_negative=beyond[1],
-        pair_detected=float(detected.areas[detections].sum()),
-        pair_reference=float(reference.areas[references].sum()),
-        pair_shared=float(shared.sum()),
+        pair_detected=exact_sum(sizes[0][pairs[0]]),
+        pair_reference=exact_sum(sizes[1][pairs[1]]),
+        pair_shared=exact_sum(shared),
     )
 
 
@@ -135,8 +172,9 @@ def mask_areas(
     for pairs, masks in zip((*within, overlaps), ((counted[0],) * 2, (counted[1],) * 2, counted), strict=True):
         kept = masks[0][pairs.first] & masks[1][pairs.second]
         conflicts.append((pairs.first[kept], pairs.second[kept], pairs.area[kept]))
-    one = _union_area(areas[0], conflicts[0], detected.polygons.__getitem__)
-    two = _union_area(areas[1], conflicts[1], reference.polygons.__getitem__)
+    rows = [np.flatnonzero(mask) for mask in counted]
+    one = _union_area(areas[0], rows[0], conflicts[0], partial(_united, detected, reference, "detected"))
+    two = _union_area(areas[1], rows[1], conflicts[1], partial(_united, detected, reference, "reference"))
     shift = len(detected)
     first, second, shared = (
         np.concatenate(columns)
@@ -147,93 +185,73 @@ def mask_areas(
             strict=True,
         )
     )
-    every = np.concatenate([detected.polygons, reference.polygons])
-    return one, two, _union_area(np.concatenate(areas), (first, second, shared), every.__getitem__)
+    every = Footprints(polygons=np.concatenate([detected.polygons, reference.polygons]))
+    united = partial(_united, every, every, "detected")
+    together = np.concatenate([rows[0], rows[1] + shift])
+    return one, two, _union_area(np.concatenate(areas), together, (first, second, shared), united)
 
 
 def _counted(within: Overlaps, matched: NDArray[np.int64], unmatched: NDArray[np.int64], count: int) -> _Conflicts:
     """Return (first, second, area) of the overlaps between footprints that count for the areas."""
     counts = np.zeros(count, dtype=bool)
     counts[matched] = counts[unmatched] = True
-    both = counts[within.first] & counts[within.second]
+    both = counts[within.first] & counts[within.second] & (within.area > 0)
     return within.first[both], within.second[both], within.area[both]
 
 
-def _pair_conflicts(
-    detected: Footprints,
-    reference: Footprints,
-    pairs: tuple[NDArray[np.int64], NDArray[np.int64]],
-    conflicts: tuple[_Conflicts, ...],
-) -> _Conflicts:
-    """Return TP pairs (first, second) whose true positive ground may overlap, and how much it does.
+def _pair_links(
+    pairs: tuple[NDArray[np.int64], NDArray[np.int64]], counts: tuple[int, int], conflicts: tuple[_Conflicts, ...]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the TP pairs (first, second) whose true positive ground may overlap.
 
     Two pairs can share such ground only where both their detections and their references share area.
     """
     n = len(pairs[0])
     keys = []
-    for members, footprints, (one, two, _) in zip(pairs, (detected, reference), conflicts, strict=True):
-        number = np.full(len(footprints), -1, dtype=np.int64)
+    for members, count, (one, two, _) in zip(pairs, counts, conflicts, strict=True):
+        number = np.full(count, -1, dtype=np.int64)
         number[members] = np.arange(n)
         first, second = np.sort([number[one], number[two]], axis=0)
         keys.append((first * n + second)[first >= 0])
     common = np.intersect1d(*keys)
-    first, second = common // max(n, 1), common % max(n, 1)
-    rows = [
-        (footprints, members[side])
-        for footprints, members in zip((detected, reference), pairs, strict=True)
-        for side in (first, second)
-    ]
-    return first, second, _shared_by_four(rows)
-
-
-def _shared_by_four(rows: list[tuple[Footprints, NDArray[np.int64]]]) -> NDArray[np.float64]:
-    """Return the area common to four footprints, given as four (set, rows)."""
-    corner_rows = [quadrilateral_rows(footprints)[index] for footprints, index in rows]
-    quick = np.all([row >= 0 for row in corner_rows], axis=0)
-    areas = np.empty(len(quick))
-    corners = [footprints.quadrilaterals[1][row[quick]] for (footprints, _), row in zip(rows, corner_rows, strict=True)]
-    areas[quick] = convex_intersection_areas(*corners)
-    common = None
-    for footprints, index in rows:
-        polygons = footprints.polygons[index[~quick]]
-        common = polygons if common is None else common_ground(common, polygons)
-    areas[~quick] = shapely.area(common)
-    return areas
+    return common // max(n, 1), common % max(n, 1)
 
 
 def _union_area(
     areas: NDArray[np.float64],
+    rows: NDArray[np.int64],
     conflicts: _Conflicts,
-    polygons_of: Callable[[list[int]], NDArray[np.object_]],
+    united: Callable[[Members], NDArray[np.float64]],
 ) -> float:
-    """Return the area of a union of members with these areas, of which some pairs share area.
+    """Return the area of the union of the footprints at `rows`, of which some pairs share area.
 
-    `polygons_of` gives the polygons of a list of members; it is asked only where three or more of them meet.
+    Polygons are united only where three or more of them meet.
     """
     first, second, shared = conflicts
     meeting = np.bincount(np.concatenate([first, second]), minlength=len(areas))
     simple = (meeting[first] == 1) & (meeting[second] == 1)
-    total = float(areas.sum() - shared[simple].sum())
-    for group in _groups(zip(first[~simple].tolist(), second[~simple].tolist(), strict=True)):
-        total += shapely.area(shapely.union_all(polygons_of(group))) - areas[group].sum()
-    return float(total)
+    start, nodes = connected_groups(first[~simple], second[~simple])
+    ground = united(Members(start, nodes, np.full(len(nodes), -1, dtype=np.int64)))
+    alone = np.ones(len(areas), dtype=bool)
+    alone[nodes] = False
+    return exact_sum(areas[rows[alone[rows]]], -shared[simple], ground)
 
 
-def _groups(links: Iterable[tuple[int, int]]) -> list[list[int]]:
-    """Return the connected components of a graph given by its links (union-find with path halving)."""
-    parent: dict[int, int] = {}
+def _united(detected: Footprints, reference: Footprints, kind: str, members: Members) -> NDArray[np.float64]:
+    """Return the area of the union of each group: compiled where there are many, else by overlay."""
+    sides = (reference, reference) if kind == "reference" else (detected, reference)
+    if len(members.one) > _MANY_MEMBERS or (np.diff(members.start) > _LARGE_GROUP).any():
+        from .outline_arrays import outlines_of  # compiled code: a comparison of small files does without
+        from .united import united_areas
 
-    def root(node: int) -> int:
-        while parent.setdefault(node, node) != node:
-            parent[node] = parent[parent[node]]
-            node = parent[node]
-        return node
-
-    for one, two in links:
-        first, second = root(one), root(two)
-        if first != second:
-            parent[max(first, second)] = min(first, second)
-    groups: dict[int, list[int]] = {}
-    for node in sorted(parent):
-        groups.setdefault(root(node), []).append(node)
-    return list(groups.values())
+        areas = united_areas(outlines_of(sides[0]), outlines_of(sides[1]), members)
+    else:
+        areas = np.full(len(members.start) - 1, np.nan)
+    for group in np.flatnonzero(np.isnan(areas)).tolist():
+        part = slice(members.start[group], members.start[group + 1])
+        ground = sides[0].polygons[members.one[part]]
+        if kind == "pairs":
+            ground = common_ground(ground, sides[1].polygons[members.two[part]])
+        # One after the other: the union of many at once can lose a polygon that touches others (GEOS 3.14).
+        areas[group] = reduce(shapely.union, ground).area
+    return areas

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprints import Footprints
 from .left_out import Counted, LeftOut, counted_detections, counted_references
-from .overlaps import Overlaps, common_ground, overlaps_between
+from .overlaps import Overlaps, overlaps_between
+from .polygon_overlay import common_ground
 
 __all__ = ["CountedSets", "Coverage", "counted_sets"]
 

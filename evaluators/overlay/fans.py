@@ -23,54 +23,19 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from ...scenes.geodata.footprints import Footprints
+from .outline_arrays import Outlines
 
-__all__ = ["Outlines", "fan_areas", "outlines_of"]
+__all__ = ["fan_areas", "in_canonical_order"]
 
 #: Share of the smaller polygon's area that the sums of a fan cannot resolve.
 _ROUNDING = 1e-12
 #: Pairs that a thread works on at a time.
 _CHUNK = 1 << 16
-
-
-class Outlines(NamedTuple):
-    """The vertices of many polygons.
-
-    Attributes
-    ----------
-    start : ndarray of int64, shape (n + 1,)
-        Polygon i has the rows ``start[i]`` to ``start[i + 1]`` of `points`.
-    points : ndarray, shape (m, 2)
-        x, y of the vertices, m: closed rings, the first one first. Further rings follow after a row of NaN.
-    sign : ndarray, shape (n,)
-        1 where the exterior runs counter-clockwise, -1 where it runs clockwise; holes run the other way.
-    bounds : ndarray, shape (n, 4)
-        xmin, ymin, xmax, ymax of each polygon, m.
-    area : ndarray, shape (n,)
-        m2.
-    """
-
-    start: NDArray[np.int64]
-    points: NDArray[np.float64]
-    sign: NDArray[np.float64]
-    bounds: NDArray[np.float64]
-    area: NDArray[np.float64]
-
-
-def outlines_of(footprints: Footprints) -> Outlines:
-    """Return the outlines of footprints."""
-    start, points = footprints.rings
-    sign = np.empty(len(footprints))
-    _orientations(start, points, sign)
-    bounds = np.asarray(shapely.bounds(footprints.polygons), dtype=np.float64).reshape(-1, 4)
-    return Outlines(start, points, sign, bounds, footprints.areas)
 
 
 def fan_areas(
@@ -89,6 +54,9 @@ def fan_areas(
 
     Examples
     --------
+    >>> import shapely
+    >>> from roofbench import Footprints
+    >>> from roofbench.evaluators.overlay.outline_arrays import outlines_of
     >>> outlines = outlines_of(Footprints.of([shapely.box(0, 0, 2, 2), shapely.box(1, 1, 3, 3)]))
     >>> fan_areas(outlines, outlines, np.array([0, 0]), np.array([0, 1]))
     array([4., 1.])
@@ -109,17 +77,37 @@ def fan_areas(
     return areas
 
 
+def in_canonical_order(
+    outlines: Outlines, first: NDArray[np.int64], second: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return pairs of one set so that the one with the lower bounds, area or vertices comes first.
+
+    The last bits of a shared area depend on which outline is taken first; so they do not depend on the order of rows.
+    """
+    first, second = first.copy(), second.copy()
+    _order(outlines, first, second)
+    return first, second
+
+
 @kernel
-def _orientations(start: NDArray[np.int64], points: NDArray[np.float64], sign: NDArray[np.float64]) -> None:
-    for i in range(len(sign)):
-        low = start[i]
-        x, y = points[low, 0], points[low, 1]
-        doubled = 0.0
-        for k in range(low, start[i + 1] - 1):
-            turn = (points[k, 0] - x) * (points[k + 1, 1] - y) - (points[k + 1, 0] - x) * (points[k, 1] - y)
-            if turn == turn:  # no edge leads to or from the NaN between two rings
-                doubled += turn
-        sign[i] = 1.0 if doubled >= 0.0 else -1.0
+def _order(outlines: Outlines, first: NDArray[np.int64], second: NDArray[np.int64]) -> None:
+    for pair in range(len(first)):
+        i, j = first[pair], second[pair]
+        less = outlines.area[i] - outlines.area[j]
+        axis = 0
+        while less == 0.0 and axis < 4:
+            less = outlines.bounds[i, axis] - outlines.bounds[j, axis]
+            axis += 1
+        low, other = outlines.start[i], outlines.start[j]
+        count = min(outlines.start[i + 1] - low, outlines.start[j + 1] - other)
+        k = 0
+        while less == 0.0 and k < count:
+            less = outlines.points[low + k, 0] - outlines.points[other + k, 0]
+            if less == 0.0:
+                less = outlines.points[low + k, 1] - outlines.points[other + k, 1]
+            k += 1
+        if less > 0.0:
+            first[pair], second[pair] = j, i
 
 
 @kernel

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
 from ..tally import Tallies
-from .overlaps import Overlaps, common_ground, shared_areas
+from .overlaps import Overlaps, shared_areas
+from .polygon_overlay import common_ground
 
 __all__ = [
     "Counted",
@@ -77,7 +78,11 @@ class Counted:
     @property
     def reasons(self) -> NDArray[np.object_]:
         """Why a footprint is left out, in words; empty where it counts."""
-        reasons: NDArray[np.object_] = _REASONS[self.code]
+        return self.reasons_of(slice(None))
+
+    def reasons_of(self, part: slice) -> NDArray[np.object_]:
+        """Return why the footprints of some rows are left out; see `reasons`."""
+        reasons: NDArray[np.object_] = _REASONS[self.code[part]]
         return reasons
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from .overlaps import common_ground
+from .polygon_overlay import common_ground
 
 __all__ = [
     "boundary_iou",

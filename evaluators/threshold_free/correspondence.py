@@ -85,8 +85,14 @@ def match(
     in coordinates of millions of metres decides nothing. Ties go to the larger overlap, then to the lower reference
     row, then to the lower detection row.
     """
-    rounded, area = np.round(distances, DECIMALS), np.round(overlaps.area, DECIMALS)
-    by_distance = np.lexsort((overlaps.first, overlaps.second, -area, rounded))
+    # The order decides only where an object takes part in several pairs: the others come first, unsorted.
+    several = (np.bincount(overlaps.first, minlength=counts[0])[overlaps.first] > 1) | (
+        np.bincount(overlaps.second, minlength=counts[1])[overlaps.second] > 1
+    )
+    lonely, contested = np.flatnonzero(~several), np.flatnonzero(several)
+    rounded, area = np.round(distances[contested], DECIMALS), np.round(overlaps.area[contested], DECIMALS)
+    ties = (overlaps.first[contested], overlaps.second[contested])
+    by_distance = np.concatenate([lonely, contested[np.lexsort((*ties, -area, rounded))]])
     nearest = _first_of_each(overlaps.first[by_distance], overlaps.second[by_distance], counts[0])
     if matching == "one-pass":
         claims = by_distance[nearest[overlaps.first[by_distance]] == overlaps.second[by_distance]]
@@ -97,7 +103,7 @@ def match(
         return Correspondence(of_detection, of_reference, nearest)
     order = by_distance
     if matching == "overlap":
-        order = np.lexsort((overlaps.first, overlaps.second, rounded, -area))
+        order = np.concatenate([lonely, contested[np.lexsort((*ties, rounded, -area))]])
     of_detection, of_reference = accept_in_order(overlaps.first[order], overlaps.second[order], counts)
     return Correspondence(of_detection, of_reference, nearest)
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..overlay.areas import AreaTally, exact_areas
 from ..overlay.left_out import clipped, remeasured
 from ..overlay.overlaps import shared_areas
 from ..overlay.pixels import pixel_areas
-from .object_graph import ObjectGraph
+from .object_graph import OverlapGraph
 from .tallies import Buildings, Counts
 
 __all__ = ["count_buildings", "count_objects", "measure_areas"]
 
 
-def count_objects(graph: ObjectGraph) -> Counts:
+def count_objects(graph: OverlapGraph) -> Counts:
     """Return the counts of section 4.2.1."""
     overlaps, within = graph.overlaps, graph.within[0].only_significant
     partner, building = graph.correspondence.of_detection, graph.reference.building_codes
@@ -30,7 +31,8 @@ def count_objects(graph: ObjectGraph) -> Counts:
     natural[natural] = building[partner[one[natural]]] == building[partner[two[natural]]]
     overlapping = np.union1d(one[~natural], two[~natural])
 
-    touched = np.unique(np.stack([overlaps.first, building[overlaps.second]], axis=1), axis=0)[:, 0]
+    buildings = int(building.max()) + 1 if len(building) else 1
+    touched = np.unique(overlaps.first * buildings + building[overlaps.second]) // buildings
     cross_lapping = (np.bincount(touched, minlength=len(graph.detected)) > 1).sum()
 
     other = partner[overlaps.first]
@@ -51,7 +53,7 @@ def count_objects(graph: ObjectGraph) -> Counts:
     )
 
 
-def count_buildings(graph: ObjectGraph) -> Buildings:
+def count_buildings(graph: OverlapGraph) -> Buildings:
     """Return how many reference buildings there are, and how many have all or any of their parts found."""
     counted = graph.references.mask
     found = graph.correspondence.of_reference >= 0
@@ -65,19 +67,28 @@ def count_buildings(graph: ObjectGraph) -> Buildings:
     )
 
 
-def measure_areas(graph: ObjectGraph, *, area: shapely.Geometry | None, lattice: Grid | None) -> AreaTally:
+def measure_areas(
+    graph: OverlapGraph,
+    detected: Footprints,
+    reference: Footprints,
+    *,
+    area: shapely.Geometry | None,
+    lattice: Grid | None,
+) -> AreaTally:
     """Return T, F and M, clipped to the evaluation area.
 
     Parameters
     ----------
-    graph : ObjectGraph
+    graph : OverlapGraph
+    detected, reference : Footprints
+        The objects of the graph.
     area : polygon or None
         Evaluation area.
     lattice : Grid or None
         Pixels to count; None for exact areas.
     """
     match, overlaps, within = graph.correspondence, graph.overlaps, graph.within
-    detected, reference, pairs = graph.detected, graph.reference, match.pairs
+    pairs = match.pairs
     false_positives = np.flatnonzero(graph.detections.mask & (match.booked_on < 0))
     false_negatives = np.flatnonzero(graph.references.mask & (match.of_reference < 0))
     shared = overlaps.area[graph.matched_overlaps]
@@ -85,8 +96,6 @@ def measure_areas(graph: ObjectGraph, *, area: shapely.Geometry | None, lattice:
         detected, reference = clipped(detected, area), clipped(reference, area)
         shared = shared_areas(detected, reference, *pairs)
         within = remeasured(detected, within[0]), remeasured(reference, within[1])
-    # Rounding may make the shared area larger than the smaller outline, and errors of pairs negative.
-    shared = np.minimum(shared, np.minimum(detected.areas[pairs[0]], reference.areas[pairs[1]]))
     if lattice is not None:
         return pixel_areas(
             detected.polygons,

@@ -21,8 +21,10 @@ from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..base import Evaluation, Evaluator
+from ..overlay.exact_sum import exact_sum
 from ..overlay.left_out import LeftOut, left_out_notes, repair_notes
 from ..overlay.outline_distances import PairDistances, pair_distances
+from ..verdict_table import Verdicts
 from .correspondence import MATCHINGS
 from .counting import count_buildings, count_objects, measure_areas
 from .indices import (
@@ -33,7 +35,7 @@ from .indices import (
     ObjectIndices,
     PixelIndices,
 )
-from .object_graph import ObjectGraph, object_graph
+from .object_graph import ObjectGraph, OverlapGraph, object_graph
 from .tallies import Counts, PairSums, Scenes, ThresholdFreeTallies
 from .verdicts import MEASURES, VERDICT_KINDS, find_verdicts
 
@@ -159,15 +161,15 @@ class ThresholdFree(Evaluator):
             buildings=count_buildings(graph),
             scenes=Scenes(all=1, by_pixels=int(by_pixels)),
             left_out=LeftOut.of(graph.detections, graph.references),
-            areas=measure_areas(graph, area=area, lattice=lattice if by_pixels else None),
-            geometric=_pair_sums(graph, outlines, lattice),
+            areas=measure_areas(graph, detected, reference, area=area, lattice=lattice if by_pixels else None),
+            geometric=_pair_sums(graph, outlines, lattice.gsd if lattice else None),
             iou=_NO_IOU.filled(graph.pair_iou),
         )
         return ThresholdFreeEvaluation(
             evaluator=self,
             tallies=tallies,
             notes=(*repair_notes(detected, reference), *self.notes_of(tallies)),
-            find_verdicts=lambda: find_verdicts(graph, outlines.outline),
+            find_verdicts=lambda: _verdicts(graph, outlines, detected, reference),
             graph=graph,
         )
 
@@ -191,20 +193,31 @@ class ThresholdFree(Evaluator):
 _NO_IOU = ThresholdFreeTallies().iou
 
 
-def _pair_sums(graph: ObjectGraph, outlines: PairDistances, lattice: Grid | None) -> PairSums:
+def _verdicts(graph: OverlapGraph, outlines: PairDistances, detected: Footprints, reference: Footprints) -> Verdicts:
+    tables = find_verdicts(graph, outlines.outline)
+    return Verdicts(
+        kinds=VERDICT_KINDS,
+        measures=MEASURES,
+        detection_table=tables[0],
+        reference_table=tables[1],
+        detected=detected,
+        reference=reference,
+    )
+
+
+def _pair_sums(graph: OverlapGraph, outlines: PairDistances, gsd: float | None) -> PairSums:
     squared: NDArray[np.float64] = outlines.outline**2
-    detections, references = graph.correspondence.pairs
-    offsets = graph.detected.centres[detections] - graph.reference.centres[references]
-    centre = np.hypot(offsets[:, 0], offsets[:, 1])
+    centre = graph.distances[graph.matched_overlaps]
+    sum_squared = exact_sum(squared)
     return PairSums(
         pairs=len(squared),
         pairs_by_corners=int(outlines.by_corners.sum()),
-        sum_squared=float(squared.sum()),
-        sum_squared_pixels=float(squared.sum() / lattice.gsd**2) if lattice else 0.0,
-        pairs_with_gsd=len(squared) if lattice else 0,
-        sum_squared_centre=float((centre**2).sum()),
-        sum_centre=float(centre.sum()),
-        sum_polis=float(outlines.polis.sum()),
+        sum_squared=sum_squared,
+        sum_squared_pixels=sum_squared / gsd**2 if gsd else 0.0,
+        pairs_with_gsd=len(squared) if gsd else 0,
+        sum_squared_centre=exact_sum(centre**2),
+        sum_centre=exact_sum(centre),
+        sum_polis=exact_sum(outlines.polis),
     )
 
 

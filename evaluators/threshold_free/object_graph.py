@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import shapely
@@ -17,16 +18,34 @@ from ..overlay.left_out import Counted, counted_detections, counted_references
 from ..overlay.overlaps import Overlaps, overlaps_between, overlaps_within
 from .correspondence import Correspondence, match
 
-__all__ = ["ObjectGraph", "object_graph"]
+__all__ = ["ObjectGraph", "Objects", "OverlapGraph", "object_graph"]
+
+
+class Objects(Protocol):
+    """What the graph asks of the footprints of one side; `Footprints` have all of it."""
+
+    @property
+    def ids(self) -> NDArray[np.int64]:
+        """Row of each object in its source, shape (n,)."""
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """Area of each object, m2, shape (n,)."""
+
+    @property
+    def building_codes(self) -> NDArray[np.int64]:
+        """Building of each object, shape (n,)."""
+
+    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ObjectGraph:
-    """Two footprint sets with their overlaps and matches.
+class OverlapGraph:
+    """Two sets of objects with their overlaps and matches.
 
     Attributes
     ----------
-    detected, reference : Footprints
+    detected, reference : Objects
     overlaps : Overlaps
         Overlapping (detection, reference) pairs of objects that count.
     distances : ndarray, shape (len(overlaps),)
@@ -38,8 +57,8 @@ class ObjectGraph:
         Which objects count, and why the others do not.
     """
 
-    detected: Footprints
-    reference: Footprints
+    detected: Objects
+    reference: Objects
     overlaps: Overlaps
     distances: NDArray[np.float64]
     within: tuple[Overlaps, Overlaps]
@@ -78,6 +97,14 @@ class ObjectGraph:
         for own, other in ((within.first, within.second), (within.second, within.first)):
             duplicates[own[holder[own] == other]] = True
         return duplicates
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ObjectGraph(OverlapGraph):
+    """The graph of two footprint sets, which has their outlines at hand."""
+
+    detected: Footprints
+    reference: Footprints
 
 
 def object_graph(

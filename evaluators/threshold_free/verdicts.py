@@ -6,15 +6,17 @@ of them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.geodata.footprints import Footprints
-from ..verdict_table import Measure, VerdictKind, Verdicts, VerdictTable
+from ..verdict_table import LazyReasons, Measure, VerdictKind, VerdictTable
 from .correspondence import DECIMALS
-from .object_graph import ObjectGraph
+from .object_graph import Objects, OverlapGraph
 
 __all__ = ["MEASURES", "VERDICT_KINDS", "find_verdicts"]
 
@@ -35,6 +37,8 @@ MEASURES = (
     Measure(key="rmse", title="corner distance", unit="m"),
 )
 
+_Texts: TypeAlias = NDArray[np.object_]
+
 _DETECTION_KINDS = tuple(kind.key for kind in VERDICT_KINDS if kind.side == "detection")
 _REFERENCE_KINDS = tuple(kind.key for kind in VERDICT_KINDS if kind.side == "reference")
 
@@ -45,15 +49,27 @@ class _Neighbours:
     def __init__(
         self, own: NDArray[np.int64], other: NDArray[np.int64], distances: NDArray[np.float64], count: int
     ) -> None:
-        order = np.lexsort((other, np.round(distances, DECIMALS), own))
-        self._pair = order
-        self._other = other[order]
-        self._start = np.searchsorted(own[order], np.arange(count + 1))
-        self.count = np.diff(self._start)
+        self.count = np.bincount(own, minlength=count)
+        self._start = np.concatenate([[0], np.cumsum(self.count)])
+        self._pair = np.argsort(own, kind="stable")
+        # Only objects with several neighbours need an order among them.
+        several = np.flatnonzero(self.count[own[self._pair]] > 1)
+        pair = self._pair[several]
+        order = np.lexsort((other[pair], np.round(distances[pair], DECIMALS), own[pair]))
+        self._pair[several] = pair[order]
+        self._other = other[self._pair]
 
-    def of(self, row: int) -> list[int]:
-        found: list[int] = self._other[self._start[row] : self._start[row + 1]].tolist()
-        return found
+    def nearest(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the nearest neighbour of objects that have one."""
+        neighbours: NDArray[np.int64] = self._other[self._start[rows]]
+        return neighbours
+
+    def of(self, rows: NDArray[np.int64]) -> list[list[int]]:
+        """Return all neighbours of some objects."""
+        begins, counts = self._start[rows], self.count[rows]
+        ends = np.cumsum(counts)
+        flat = self._other[np.arange(counts.sum()) + np.repeat(begins - ends + counts, counts)].tolist()
+        return [flat[end - count : end] for end, count in zip(ends.tolist(), counts.tolist(), strict=True)]
 
     def nearest_pair(self) -> NDArray[np.int64]:
         """Return for each object the position of its nearest pair in the overlaps, or -1."""
@@ -63,14 +79,14 @@ class _Neighbours:
         return pair
 
 
-def find_verdicts(graph: ObjectGraph, pair_outline: NDArray[np.float64]) -> Verdicts:
+def find_verdicts(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> tuple[VerdictTable, VerdictTable]:
     """Write one row per detection and one per reference.
 
     The partner of an object without a match is the nearest one that it overlaps. ``rmse`` is given for TP only.
 
     Parameters
     ----------
-    graph : ObjectGraph
+    graph : OverlapGraph
     pair_outline : ndarray, shape (number of TP pairs,)
         Outline distance of each TP pair, by detection, m.
     """
@@ -79,13 +95,12 @@ def find_verdicts(graph: ObjectGraph, pair_outline: NDArray[np.float64]) -> Verd
     of_reference = _Neighbours(pairs.second, pairs.first, graph.distances, len(graph.reference))
     words = _Words(graph, of_detection, of_reference, _Claims.of(graph))
     detections, references = match.pairs
-    pair_of_match = np.full(len(graph.detected), -1, dtype=np.int64)
-    pair_of_match[detections] = graph.matched_overlaps
 
     matched = match.of_detection >= 0
     kind = np.where(matched, 0, np.where(of_detection.count > 0, 1, 2)).astype(np.uint8)
     kind[~graph.detections.mask] = 3
-    position = np.where(matched, pair_of_match, of_detection.nearest_pair())
+    position = of_detection.nearest_pair()
+    position[detections] = graph.matched_overlaps
     partner, measures = _measured(graph, position, graph.detected, graph.reference.ids, pairs.second)
     measures["rmse"] = _spread(pair_outline, detections, len(graph.detected))
     detection_table = VerdictTable(
@@ -94,15 +109,14 @@ def find_verdicts(graph: ObjectGraph, pair_outline: NDArray[np.float64]) -> Verd
         kind=kind,
         partner=partner,
         measures=measures,
-        reasons=tuple(words.of_detections(kind, measures["distance"])),
+        reasons=LazyReasons(len(kind), partial(words.of_detections, kind, measures)),
     )
 
     matched = match.of_reference >= 0
     kind = np.where(matched, 0, 1).astype(np.uint8)
     kind[~graph.references.mask] = 2
-    own_pair = np.full(len(graph.reference), -1, dtype=np.int64)
-    own_pair[references] = graph.matched_overlaps
-    position = np.where(matched, own_pair, of_reference.nearest_pair())
+    position = of_reference.nearest_pair()
+    position[references] = graph.matched_overlaps
     partner, measures = _measured(graph, position, graph.reference, graph.detected.ids, pairs.first)
     measures["rmse"] = _spread(pair_outline, references, len(graph.reference))
     reference_table = VerdictTable(
@@ -111,16 +125,9 @@ def find_verdicts(graph: ObjectGraph, pair_outline: NDArray[np.float64]) -> Verd
         kind=kind,
         partner=partner,
         measures=measures,
-        reasons=tuple(words.of_references(kind, measures)),
+        reasons=LazyReasons(len(kind), partial(words.of_references, kind, measures)),
     )
-    return Verdicts(
-        kinds=VERDICT_KINDS,
-        measures=MEASURES,
-        detection_table=detection_table,
-        reference_table=reference_table,
-        detected=graph.detected,
-        reference=graph.reference,
-    )
+    return detection_table, reference_table
 
 
 def _spread(values: NDArray[np.float64], rows: NDArray[np.int64], count: int) -> NDArray[np.float64]:
@@ -131,9 +138,9 @@ def _spread(values: NDArray[np.float64], rows: NDArray[np.int64], count: int) ->
 
 
 def _measured(
-    graph: ObjectGraph,
+    graph: OverlapGraph,
     position: NDArray[np.int64],
-    own: Footprints,
+    own: Objects,
     other_ids: NDArray[np.int64],
     other_rows: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], dict[str, NDArray[np.float64]]]:
@@ -149,17 +156,22 @@ def _measured(
     }
 
 
-def _names(footprints: Footprints, rows: list[int]) -> str:
-    """Return the ids of some footprints in words: ``12``, ``12 and 13``, ``12, 13 and 4 more``."""
-    ids = [str(identity) for identity in footprints.ids[rows[:3]].tolist()]
-    more = len(rows) - len(ids)
-    if more:
-        return f"{', '.join(ids)} and {more} more"
-    return " and ".join([", ".join(ids[:-1]), ids[-1]] if len(ids) > 1 else ids)
+def _names(ids: list[int]) -> str:
+    """Return some ids in words: ``12``, ``12 and 13``, ``12, 13, 14 and 4 more``."""
+    if len(ids) == 1:
+        return str(ids[0])
+    if len(ids) > 3:
+        return f"{', '.join(map(str, ids[:3]))} and {len(ids) - 3} more"
+    return f"{', '.join(map(str, ids[:-1]))} and {ids[-1]}"
 
 
 def _share(part: float) -> str:
     return f"{100 * part:.0f} %" if part >= 0.01 else "less than 1 %"
+
+
+def _claimed(pieces: int, times: int, subject: str = "") -> str:
+    text = f"; {subject}split into {pieces} detections" if pieces > 1 else ""
+    return text + (f"; {subject}detected {times} times" if times > 1 else "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,124 +180,130 @@ class _Claims:
 
     Attributes
     ----------
-    pieces : list of int
+    pieces : ndarray of int64
         Detections that are matched with a reference or are pieces of it: more than one where it is split.
-    times : list of int
+    times : ndarray of int64
         Detections that are matched with it or duplicate that one: more than one where it is detected again.
-    home : list of int
+    home : ndarray of int64
         For each detection the reference that it is matched with or booked on, or -1.
     """
 
-    pieces: list[int]
-    times: list[int]
-    home: list[int]
+    pieces: NDArray[np.int64]
+    times: NDArray[np.int64]
+    home: NDArray[np.int64]
 
     @classmethod
-    def of(cls, graph: ObjectGraph) -> _Claims:
+    def of(cls, graph: OverlapGraph) -> _Claims:
         match = graph.correspondence
         multiple = graph.detections.mask & (match.of_detection < 0) & (match.booked_on >= 0)
         found = (match.of_reference >= 0).astype(np.int64)
 
-        def booked(kind: NDArray[np.bool_]) -> list[int]:
-            numbers: list[int] = np.bincount(match.booked_on[multiple & kind], minlength=len(found)).tolist()
-            return numbers
+        def booked(kind: NDArray[np.bool_]) -> NDArray[np.int64]:
+            return np.bincount(match.booked_on[multiple & kind], minlength=len(found))
 
         home = np.where(match.of_detection >= 0, match.of_detection, match.booked_on)
-        return cls(
-            [own + more for own, more in zip(found.tolist(), booked(~graph.duplicates), strict=True)],
-            [own + more for own, more in zip(found.tolist(), booked(graph.duplicates), strict=True)],
-            home.tolist(),
-        )
-
-    def in_words(self, reference: int, subject: str = "") -> str:
-        text = f"; {subject}split into {self.pieces[reference]} detections" if self.pieces[reference] > 1 else ""
-        return text + (f"; {subject}detected {self.times[reference]} times" if self.times[reference] > 1 else "")
+        return cls(found + booked(~graph.duplicates), found + booked(graph.duplicates), home)
 
 
 class _Words:
-    """Reasons in words."""
+    """Reasons in words, for a stretch of rows at a time."""
 
     def __init__(
-        self, graph: ObjectGraph, of_detection: _Neighbours, of_reference: _Neighbours, claims: _Claims
+        self, graph: OverlapGraph, of_detection: _Neighbours, of_reference: _Neighbours, claims: _Claims
     ) -> None:
         self._graph = graph
         self._of_detection, self._of_reference = of_detection, of_reference
         self._claims = claims
-        self._detection_ids, self._reference_ids = graph.detected.ids.tolist(), graph.reference.ids.tolist()
 
-    def of_detections(self, kind: NDArray[np.uint8], distance: NDArray[np.float64]) -> list[str]:
+    def of_detections(
+        self, kind: NDArray[np.uint8], measures: Mapping[str, NDArray[np.float64]], part: slice
+    ) -> _Texts:
         claims, graph = self._claims, self._graph
-        touched, duplicates = self._of_detection.count.tolist(), graph.duplicates.tolist()
-        holder, left_out = graph.correspondence.of_reference.tolist(), graph.detections.reasons
-        reasons = []
-        for row, (place, moved) in enumerate(zip(kind.tolist(), distance.tolist(), strict=True)):
-            verdict = _DETECTION_KINDS[place]
-            if verdict == "FP":
-                reasons.append("false alarm: overlaps no reference")
-                continue
-            if verdict == "left out":
-                reasons.append(str(left_out[row]))
-                continue
-            own = claims.home[row]
-            name = self._reference_ids[own]
-            if verdict == "TP":
-                text = f"found reference {name}, shifted {moved:.1f} m"
-                text += claims.in_words(own, "the reference is ")
-            elif duplicates[row]:
-                text = f"duplicate of detection {self._detection_ids[holder[own]]} on reference {name}"
-            else:
-                text = (
-                    f"piece of reference {name}, which is split into {claims.pieces[own]} detections and "
-                    f"represented by detection {self._detection_ids[holder[own]]}"
-                )
-            if touched[row] > 1:
-                others = [other for other in self._of_detection.of(row) if other != own]
-                text += f"; also covers part of reference {_names(graph.reference, others)}"
-            reasons.append(text)
-        return reasons
+        texts = np.full(part.stop - part.start, "false alarm: overlaps no reference", dtype=object)
+        verdict = kind[part]
+        texts[verdict == 3] = graph.detections.reasons_of(part)[verdict == 3]
 
-    def of_references(self, kind: NDArray[np.uint8], measures: dict[str, NDArray[np.float64]]) -> list[str]:
-        graph = self._graph
-        overlapping, left_out = self._of_reference.count.tolist(), graph.references.reasons
-        covered = (measures["overlap_area"] / graph.reference.areas).tolist()
-        distance = measures["distance"].tolist()
-        reasons = []
-        for row, place in enumerate(kind.tolist()):
-            verdict = _REFERENCE_KINDS[place]
-            if verdict == "left out":
-                reasons.append(str(left_out[row]))
-            elif verdict == "TP":
-                reasons.append(self._found(row, distance[row], overlapping[row]))
-            elif overlapping[row] == 0:
-                reasons.append("missed: no detection overlaps it")
-            else:
-                reasons.append(self._missed(row, covered[row]))
-        return reasons
+        found = part.start + np.flatnonzero(verdict == 0)
+        own = claims.home[found]
+        columns = (graph.reference.ids[own], measures["distance"][found], claims.pieces[own], claims.times[own])
+        texts[found - part.start] = [
+            f"found reference {name}, shifted {moved:.1f} m"
+            + (_claimed(pieces, times, "the reference is ") if pieces > 1 or times > 1 else "")
+            for name, moved, pieces, times in zip(*(column.tolist() for column in columns), strict=True)
+        ]
 
-    def _found(self, row: int, moved: float, overlapping: int) -> str:
+        multiple = part.start + np.flatnonzero(verdict == 1)
+        own = claims.home[multiple]
+        holder = graph.detected.ids[graph.correspondence.of_reference[own]]
+        columns = (graph.reference.ids[own], holder, claims.pieces[own], graph.duplicates[multiple])
+        texts[multiple - part.start] = [
+            f"duplicate of detection {first} on reference {name}"
+            if duplicate
+            else f"piece of reference {name}, which is split into {pieces} detections and represented by "
+            f"detection {first}"
+            for name, first, pieces, duplicate in zip(*(column.tolist() for column in columns), strict=True)
+        ]
+
+        wide = part.start + np.flatnonzero((verdict < 2) & (self._of_detection.count[part] > 1))
+        for row, own_row, neighbours in zip(
+            wide.tolist(), claims.home[wide].tolist(), self._of_detection.of(wide), strict=True
+        ):
+            others = _names(graph.reference.ids[[other for other in neighbours if other != own_row]].tolist())
+            texts[row - part.start] += f"; also covers part of reference {others}"
+        return texts
+
+    def of_references(
+        self, kind: NDArray[np.uint8], measures: Mapping[str, NDArray[np.float64]], part: slice
+    ) -> _Texts:
+        graph, overlapping = self._graph, self._of_reference.count
+        texts = np.full(part.stop - part.start, "missed: no detection overlaps it", dtype=object)
+        verdict = kind[part]
+        texts[verdict == 2] = graph.references.reasons_of(part)[verdict == 2]
+        found = part.start + np.flatnonzero(verdict == 0)
+        texts[found - part.start] = self._found(found, measures["distance"][found])
+        missed = part.start + np.flatnonzero((verdict == 1) & (overlapping[part] > 0))
+        covered = measures["overlap_area"][missed] / graph.reference.areas[missed]
+        texts[missed - part.start] = self._missed(missed, covered)
+        return texts
+
+    def _found(self, rows: NDArray[np.int64], moved: NDArray[np.float64]) -> list[str]:
         claims, graph = self._claims, self._graph
-        own = int(graph.correspondence.of_reference[row])
-        text = f"found by detection {self._detection_ids[own]}, shifted {moved:.1f} m" + claims.in_words(row)
-        if self._of_detection.count[own] > 1:
-            others = [other for other in self._of_detection.of(own) if other != row]
-            text += f"; the detection also covers part of reference {_names(graph.reference, others)}"
-        if overlapping > claims.pieces[row] + claims.times[row] - 1:
-            others = [other for other in self._of_reference.of(row) if claims.home[other] != row]
-            names = _names(graph.detected, others)
-            text += (
+        own = graph.correspondence.of_reference[rows]
+        columns = (graph.detected.ids[own], moved, claims.pieces[rows], claims.times[rows])
+        texts = [
+            f"found by detection {name}, shifted {distance:.1f} m"
+            + (_claimed(pieces, times) if pieces > 1 or times > 1 else "")
+            for name, distance, pieces, times in zip(*(column.tolist() for column in columns), strict=True)
+        ]
+        wide = np.flatnonzero(self._of_detection.count[own] > 1)
+        for place, row, neighbours in zip(
+            wide.tolist(), rows[wide].tolist(), self._of_detection.of(own[wide]), strict=True
+        ):
+            others = _names(graph.reference.ids[[other for other in neighbours if other != row]].tolist())
+            texts[place] += f"; the detection also covers part of reference {others}"
+        shared = np.flatnonzero(self._of_reference.count[rows] > claims.pieces[rows] + claims.times[rows] - 1)
+        for place, row, neighbours in zip(
+            shared.tolist(), rows[shared].tolist(), self._of_reference.of(rows[shared]), strict=True
+        ):
+            strangers = [other for other in neighbours if claims.home[other] != row]
+            names = _names(graph.detected.ids[strangers].tolist())
+            texts[place] += (
                 f"; detection {names} of another reference covers part of it"
-                if len(others) == 1
+                if len(strangers) == 1
                 else f"; detections {names} of other references cover parts of it"
             )
-        return text
+        return texts
 
-    def _missed(self, row: int, covered: float) -> str:
-        nearest = self._of_reference.of(row)[0]
-        name, share = self._detection_ids[nearest], _share(covered)
-        matched = int(self._graph.correspondence.of_detection[nearest])
-        if matched >= 0:
-            other = self._reference_ids[matched]
-            return f"merged with reference {other} into detection {name}, which covers {share} of it"
-        # Only where a detection has a single choice (one-pass matching).
-        other = self._reference_ids[self._claims.home[nearest]]
-        return f"missed: detection {name} overlaps it ({share}) but is booked on reference {other}"
+    def _missed(self, rows: NDArray[np.int64], covered: NDArray[np.float64]) -> list[str]:
+        graph = self._graph
+        nearest = self._of_reference.nearest(rows)
+        matched = graph.correspondence.of_detection[nearest] >= 0
+        # Without a match only where a detection has a single choice (one-pass matching).
+        home = graph.reference.ids[self._claims.home[nearest]]
+        columns = (graph.detected.ids[nearest], home, matched, covered)
+        return [
+            f"merged with reference {other} into detection {name}, which covers {_share(share)} of it"
+            if has
+            else f"missed: detection {name} overlaps it ({_share(share)}) but is booked on reference {other}"
+            for name, other, has, share in zip(*(column.tolist() for column in columns), strict=True)
+        ]

@@ -16,7 +16,9 @@ Source of the definitions: Awrangjeb, Ravanbakhsh & Fraser (2010), section 4.1.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -35,6 +37,9 @@ __all__ = ["Footprints", "Repair", "polygonal_part"]
 _WIDEST_GAP = 100.0
 #: Coordinates of no system on earth, metres; squares of such numbers are not finite.
 _FARTHEST = 1e9
+
+#: Geometries that a thread tests at a time.
+_CHUNK = 1 << 14
 
 #: Stands for "number the rows from 0".
 _UNNUMBERED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
@@ -214,6 +219,11 @@ class Footprints:
         return np.asarray(shapely.area(self.polygons), dtype=np.float64)
 
     @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """Bounds xmin, ymin, xmax, ymax of each footprint, m, shape (n, 4)."""
+        return np.asarray(shapely.bounds(self.polygons), dtype=np.float64).reshape(-1, 4)
+
+    @cached_property
     def building_codes(self) -> NDArray[np.int64]:
         """Building of each footprint as integers from 0, shape (n,)."""
         if self.building_ids is None:
@@ -268,7 +278,8 @@ class Footprints:
         index, corners = self.quadrilaterals
         others = np.ones(len(self), dtype=bool)
         others[index] = False
-        centres[others] = shapely.get_coordinates(shapely.centroid(self.polygons[others]))
+        if others.any():
+            centres[others] = _centroids(*self.rings)[others]
         if len(index):
             first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
             offset = corners[:, 1] - corners[:, 0]
@@ -276,6 +287,25 @@ class Footprints:
             along /= first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
             centres[index] = corners[:, 0] + along[:, None] * first
         return centres
+
+
+def _centroids(start: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the area centroid of each footprint with these rings, shape (n, 2)."""
+    counts = np.diff(start)
+    some = counts > 0
+    origin = np.full((len(counts), 2), np.nan)
+    origin[some] = points[start[:-1][some]]
+    # Coordinates from the first vertex keep all digits however far the scene is from the origin of its CRS.
+    x, y = (points - np.repeat(origin, counts, axis=0)).T
+    turn = x[:-1] * y[1:] - x[1:] * y[:-1]
+    moments = np.stack([turn, turn * (x[:-1] + x[1:]), turn * (y[:-1] + y[1:])], axis=1)
+    moments[np.isnan(turn)] = 0.0  # between two rings
+    moments[start[1:-1][counts[:-1] > 0] - 1] = 0.0  # between two footprints
+    sums = np.zeros((len(counts), 3))
+    sums[some] = np.add.reduceat(moments, start[:-1][some], axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        centroids: NDArray[np.float64] = origin + sums[:, 1:] / (3 * sums[:, :1])
+    return centroids
 
 
 def _as_geometry_array(polygons: Iterable[Any]) -> NDArray[np.object_]:
@@ -326,7 +356,7 @@ def _mend(
     leave_out(~finite, "coordinates that are not finite")
     leave_out(finite & (np.abs(bounds) > _FARTHEST).any(axis=1), f"coordinates beyond {_FARTHEST:g} m")
 
-    suspect = np.flatnonzero(kept)[~shapely.is_valid(geometries[kept])]
+    suspect = np.flatnonzero(kept)[~_are_valid(geometries[kept])]
     suspect = np.union1d(suspect, np.flatnonzero(kept & (shapely.get_type_id(geometries) == 7)))
     for row in suspect:
         collection = geometries[row].geom_type == "GeometryCollection"
@@ -344,6 +374,15 @@ def _mend(
     leave_out(flat, "zero area")
     repairs.sort(key=lambda repair: repair.id)
     return geometries[kept], tuple(repairs), kept
+
+
+def _are_valid(geometries: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Return which geometries are valid; many of them are tested by several threads."""
+    if len(geometries) <= _CHUNK:
+        return np.asarray(shapely.is_valid(geometries))
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        parts = pool.map(shapely.is_valid, np.array_split(geometries, len(geometries) // _CHUNK + 1))
+        return np.concatenate(list(parts))
 
 
 def polygonal_part(geometry: shapely.Geometry, *, grid_size: float | None = None) -> shapely.Geometry:

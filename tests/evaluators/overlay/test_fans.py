@@ -10,7 +10,8 @@ from builders.outlines import star, stars
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from roofbench.evaluators.overlay.fans import fan_areas, outlines_of
+from roofbench.evaluators.overlay.fans import fan_areas
+from roofbench.evaluators.overlay.outline_arrays import outlines_of
 from roofbench.scenes.geodata.footprints import Footprints
 
 

@@ -48,8 +48,8 @@ def test_counts_are_equal_and_areas_agree_to_nine_digits(block, general, matchin
 
 @pytest.mark.parametrize("seed", range(20))
 def test_large_outlines_cut_into_pieces_share_the_same_areas(seed, monkeypatch):
-    monkeypatch.setattr("roofbench.evaluators.overlay.overlaps._MANY_VERTICES", 6)
-    monkeypatch.setattr("roofbench.evaluators.overlay.overlaps._FEW_PAIRS", 1)
+    monkeypatch.setattr("roofbench.evaluators.overlay.polygon_overlay._MANY_VERTICES", 6)
+    monkeypatch.setattr("roofbench.evaluators.overlay.polygon_overlay._FEW_PAIRS", 1)
     detected, reference, building = scene(seed, general=True)
     evaluation = ThresholdFree().evaluate(footprints(detected), footprints(reference, building))
     assert_same(evaluation, naive.evaluate(detected, reference, building))

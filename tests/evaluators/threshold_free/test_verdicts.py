@@ -136,9 +136,8 @@ def test_verdicts_partners_and_measures_are_those_of_plain_loops(seed):
     graph = object_graph(rb.Footprints.of(detected), rb.Footprints.of(reference, building_ids=building))
     rows = zip(*(side.tolist() for side in graph.correspondence.pairs), strict=True)
     outline = np.array([outline_distance(detected[d], reference[r]) for d, r in rows])
-    found = find_verdicts(graph, outline)
+    table, reference_table = find_verdicts(graph, outline)
     matches, nearest = correspondence(detected, reference)
-    table = found.detection_table
     for d in range(len(detected)):
         expected = "TP" if d in matches else "MD" if d in nearest else "FP"
         assert table.verdicts[d] == expected
@@ -154,5 +153,20 @@ def test_verdicts_partners_and_measures_are_those_of_plain_loops(seed):
         assert values["iou"] == pytest.approx(one.intersection(two).area / one.union(two).area, abs=1e-6)
         assert np.isnan(values["rmse"]) == (d not in matches)
     missed = [r for r in range(len(reference)) if r not in matches.values()]
-    assert np.flatnonzero(found.reference_table.where("FN")).tolist() == missed
-    assert all(found.reference_table.reasons)
+    assert np.flatnonzero(reference_table.where("FN")).tolist() == missed
+    assert all(reference_table.reasons)
+
+
+def test_reasons_are_the_same_for_each_stretch_of_rows():
+    rng = np.random.default_rng(3)
+    reference, building = random_reference(rng, general=True)
+    detected = random_detections(rng, reference)
+    verdicts = rb.evaluate(rb.Footprints.of(detected), rb.Footprints.of(reference, building_ids=building)).verdicts
+    for table in (verdicts.detection_table, verdicts.reference_table):
+        whole = list(table.reasons)
+        assert [table.reasons[row] for row in range(len(table))] == whole
+        assert table.reasons[-1] == whole[-1]
+        assert [*table.reasons[:5], *table.reasons[5:]] == whole
+        assert table.reasons[1:9:3] == whole[1:9:3]
+        with pytest.raises(IndexError):
+            table.reasons[len(table)]
