@@ -25,6 +25,6 @@ def ls(
     from ..benchmark.store.listing import list_runs
     from ..reports.listing_text import format_listing
 
-    columns: Literal["few", "all"] = "all" if form == "json" else "few"
-    listing = list_runs(store, status=status, detector=detectors, scene=scenes, limit=limit or None, columns=columns)
-    typer.echo(format_listing(listing, form), nl=False)
+    listing = list_runs(store, status=status, detector=detectors, scene=scenes, limit=limit or None)
+    for piece in format_listing(listing, form):
+        typer.echo(piece, nl=False)

@@ -137,11 +137,15 @@ class Table:
             columns.append([head, rule, *body])
         return "\n".join(f"| {' | '.join(line)} |" for line in zip(*columns, strict=True))
 
-    def to_csv(self) -> str:
-        """Return CSV with a header; numbers as Python writes them, empty where undefined."""
+    def to_csv(self, *, header: bool = True) -> str:
+        """Return CSV, with a header unless it continues another table; numbers as Python writes them.
+
+        Undefined values are empty.
+        """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow([column.title for column in self.columns])
+        if header:
+            writer.writerow([column.title for column in self.columns])
         writer.writerows(self.rows)
         return text.getvalue()
 

@@ -311,6 +311,25 @@ def one_home_for_kernels(house: House) -> set[str]:
     }
 
 
+def annotated_kernels(house: House) -> set[str]:
+    """Kernels annotate every argument and what they return."""
+    found = set()
+    for module in house.modules.values():
+        for node in ast.walk(module.tree):
+            if not isinstance(node, ast.FunctionDef) or not any(map(_is_kernel, node.decorator_list)):
+                continue
+            given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+            if node.returns is None or any(argument.annotation is None for argument in given):
+                found.add(f"{module.name}: {node.name}")
+    return found
+
+
+def _is_kernel(decorator: ast.expr) -> bool:
+    """Return whether a decorator is ``kernel``, with or without options."""
+    made = decorator.func if isinstance(decorator, ast.Call) else decorator
+    return ast.unparse(made).split(".")[-1] == "kernel"
+
+
 Rule = Callable[[House], set[str]]
 RULES: tuple[Rule, ...] = (
     imports_run_downwards,
@@ -325,6 +344,7 @@ RULES: tuple[Rule, ...] = (
     short_modules,
     detectors_do_not_draw,
     one_home_for_kernels,
+    annotated_kernels,
 )
 
 
