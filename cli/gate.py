@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,7 +12,7 @@ from ..core.errors import InputError, ParameterError, UnknownNameError
 from .command import RunOptions, with_run_options
 from .console import messages
 from .measuring import measure_suite
-from .options import FORMAT_HELP, DetectorOption, IndicesOption, OverwriteOption, ScenesOption, SuiteOption
+from .options import DetectorOption, FormatOption, IndicesOption, OverwriteOption, ScenesOption, SuiteOption
 
 if TYPE_CHECKING:
     from ..benchmark.analysis.baseline import Baseline
@@ -63,7 +63,7 @@ def gate(
         float,
         typer.Option("--time-margin", min=0.001, metavar="SHARE", help="Share of run time that counts as equal."),
     ] = 0.1,
-    form: Annotated[Literal["table", "md", "json"], typer.Option("--format", "-f", help=FORMAT_HELP)] = "table",
+    form: FormatOption = "table",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="Markdown file for the result.")
     ] = None,

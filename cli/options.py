@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import typer
 
@@ -26,6 +26,7 @@ __all__ = [
     "DpiOption",
     "EvaluatorOption",
     "EvaluatorsOption",
+    "FormatOption",
     "GsdOption",
     "IndexOption",
     "IndicesOption",
@@ -45,6 +46,7 @@ __all__ = [
     "SuiteOption",
     "TimeLimitOption",
     "VerboseOption",
+    "WideOption",
     "WordsArgument",
     "read_assignment",
     "read_size",
@@ -124,6 +126,7 @@ EvaluatorsOption = Annotated[
         autocompletion=completion.evaluators,
     ),
 ]
+FormatOption = Annotated[Literal["table", "csv", "md", "json"], typer.Option("--format", "-f", help=FORMAT_HELP)]
 GsdOption = Annotated[float | None, typer.Option("--gsd", metavar="M", help="Ground sampling distance in metres.")]
 IndexOption = Annotated[
     str | None,
@@ -191,6 +194,9 @@ TimeLimitOption = Annotated[
     typer.Option("--time-limit", min=0.001, metavar="SECONDS", help="Time limit of one run, by the wall clock."),
 ]
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Report every finished run.")]
+WideOption = Annotated[
+    bool, typer.Option("--wide", help="Show every index, and the mean over scenes beside the pooled value.")
+]
 WordsArgument = Annotated[
     list[str] | None,
     typer.Argument(

@@ -16,10 +16,12 @@ from .options import (
     DetectorOption,
     DetectorSeedsOption,
     EvaluatorsOption,
+    FormatOption,
     IndexOption,
     OverwriteOption,
     ScenesOption,
     SeedsOption,
+    WideOption,
     WordsArgument,
 )
 from .progress import run_progress
@@ -46,6 +48,8 @@ def run(
     ] = None,
     overwrite: OverwriteOption = False,
     index: IndexOption = None,
+    form: FormatOption = "table",
+    wide: WideOption = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="List what would run, and why the rest would not, and stop.")
     ] = False,
@@ -72,7 +76,7 @@ def run(
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
     from ..reports.html_report import write_report
-    from ..reports.leaderboard_text import print_leaderboard, print_unsuccessful, write_leaderboards
+    from ..reports.leaderboard_text import print_unsuccessful, show_leaderboards, write_leaderboards
 
     execution = options.execution()
     if resume and words:
@@ -118,10 +122,7 @@ def run(
                 evaluated = list(zip(plan.evaluators, boards, strict=True))
                 filled = fill_report(opened, result.rows, title=f"Suite {suite.name}", evaluated=evaluated)
                 write_report(filled, output / "report.html", overwrite=True)
-        for number, board in enumerate(boards):
-            if number:
-                typer.echo()
-            print_leaderboard(board, table_console())
+        show_leaderboards(boards, form, table_console(), wide=wide)
         unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
         print_unsuccessful([*unsuccessful_runs(result.rows), *unevaluated], console)
         if result.failed or unevaluated:

@@ -9,7 +9,16 @@ import typer
 from . import completion
 from .command import load_plugins
 from .console import messages, table_console
-from .options import DEFAULT_STORE, DetectorsOption, IndexOption, PluginOption, ScenesOption, StoreOption
+from .options import (
+    DEFAULT_STORE,
+    DetectorsOption,
+    FormatOption,
+    IndexOption,
+    PluginOption,
+    ScenesOption,
+    StoreOption,
+    WideOption,
+)
 
 __all__ = ["score"]
 
@@ -28,6 +37,8 @@ def score(
     detectors: DetectorsOption = None,
     scenes: ScenesOption = None,
     index: IndexOption = None,
+    form: FormatOption = "table",
+    wide: WideOption = False,
     store: StoreOption = DEFAULT_STORE,
     plugin: PluginOption = None,
 ) -> None:
@@ -40,7 +51,7 @@ def score(
     from ..benchmark.plan import KeyedEvaluator
     from ..benchmark.store.writer import Store
     from ..evaluators.registry import make_evaluator
-    from ..reports.leaderboard_text import print_leaderboard, print_unsuccessful
+    from ..reports.leaderboard_text import print_unsuccessful, show_leaderboards
 
     load_plugins(plugin)
     evaluators = tuple(KeyedEvaluator.of(make_evaluator(name)) for name in evaluator)
@@ -56,8 +67,7 @@ def score(
             make_leaderboard(rows, opened, keyed, title=f"Stored runs of {store}", rank_by=index)
             for keyed in evaluators
         ]
-        for board in boards:
-            print_leaderboard(board, table_console())
+        show_leaderboards(boards, form, table_console(), wide=wide)
     unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
     print_unsuccessful(unevaluated, messages())
     if unevaluated:

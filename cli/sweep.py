@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,6 +14,7 @@ from .console import messages, table_console
 from .options import (
     DetectorSeedsOption,
     EvaluatorsOption,
+    FormatOption,
     IndexOption,
     OverwriteOption,
     ScenesOption,
@@ -61,6 +62,7 @@ def sweep(
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="Tidy table, .csv or .parquet.")
     ] = None,
     evaluator: EvaluatorsOption = None,
+    form: FormatOption = "table",
     overwrite: OverwriteOption = False,
     *,
     options: RunOptions,
@@ -100,11 +102,11 @@ def sweep(
     if output is not None:
         write_table(table, output, overwrite=overwrite)
         console.print(f"{output}: {len(table)} rows", markup=False)
-    _print(table, planned, shown)
+    _print(table, planned, shown, form)
     if level is not None:
         first = table[table["evaluator"] == planned.plan.evaluators[0].label]
         for found in break_downs(first, planned.axes, shown, level):
-            typer.echo(break_down_text(found))
+            typer.echo(break_down_text(found), err=form in ("csv", "json"))
     unsuccessful = unsuccessful_runs(rows)
     print_unsuccessful(unsuccessful, console)
     if any(run.status == "failed" for run in unsuccessful):
@@ -127,11 +129,16 @@ def write_table(table: pd.DataFrame, path: Path, *, overwrite: bool) -> None:
             raise OutputError(f"{path}: Parquet needs pyarrow: pip install 'roofbench[parquet]'") from error
 
 
-def _print(table: pd.DataFrame, planned: Sweep, index: Index) -> None:
-    from ..reports.sweep_text import sweep_table
+def _print(table: pd.DataFrame, planned: Sweep, index: Index, form: Literal["table", "csv", "md", "json"]) -> None:
+    from ..reports.sweep_text import sweep_records, sweep_table
 
+    if form in ("csv", "json"):
+        tidy = sweep_records(table)
+        typer.echo(tidy.to_csv() if form == "csv" else tidy.to_json(), nl=form == "json")
+        return
     first = planned.plan.evaluators[0].label
     console = table_console()
     text = sweep_table(table[table["evaluator"] == first], [axis.name for axis in planned.axes], index)
-    console.print(text.to_text(console.width), markup=False, soft_wrap=True)
+    shown = text.to_markdown() + "\n" if form == "md" else text.to_text(console.width)
+    console.print(shown, markup=False, soft_wrap=True)
     console.print(f"mean of {index.title} over scenes, {first}, with its bootstrap interval", markup=False)

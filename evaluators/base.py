@@ -117,6 +117,8 @@ class Evaluator(Parameterised, ABC):
         Keys of the indices that are gated; every principal index with a direction where it is empty.
     swept_by : tuple of str
         Keys of the indices that sensitivity plots show; the one that ranks where it is empty.
+    summarised_by : tuple of str
+        Keys of the indices that leaderboards show beside the one that ranks; the gated ones where it is empty.
     verdict_kinds : tuple of VerdictKind
         In the order of legends; empty where it gives no verdicts.
     measures : tuple of Measure
@@ -161,6 +163,7 @@ class Evaluator(Parameterised, ABC):
     ranked_by: ClassVar[str] = ""
     gated_by: ClassVar[tuple[str, ...]] = ()
     swept_by: ClassVar[tuple[str, ...]] = ()
+    summarised_by: ClassVar[tuple[str, ...]] = ()
     verdict_kinds: ClassVar[tuple[VerdictKind, ...]] = ()
     measures: ClassVar[tuple[Measure, ...]] = ()
     curves: ClassVar[tuple[Curve, ...]] = ()
@@ -271,6 +274,12 @@ class Evaluator(Parameterised, ABC):
     def swept_indices(cls, names: Sequence[str] | None = None) -> tuple[Index, ...]:
         """Return the indices that sensitivity plots show: those named, else those declared, else the one that ranks."""
         return tuple(dict.fromkeys(cls.index(name) for name in names or cls.swept_by)) or (cls.ranking_index(),)
+
+    @classmethod
+    def summary_indices(cls, ranking: Index) -> tuple[Index, ...]:
+        """Return the indices that leaderboards show: the one that ranks, then those declared, else the gated ones."""
+        others = tuple(map(cls.index, cls.summarised_by)) or cls.gated_indices()
+        return tuple(dict.fromkeys((ranking, *others)))
 
     @classmethod
     def kinds_of(cls, side: Side) -> tuple[VerdictKind, ...]:

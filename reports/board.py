@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ParamSpec, Self
 
 from ..benchmark import session
 from ..benchmark.analysis.results import Leaderboard
-from .leaderboard_text import leaderboard_caption, leaderboard_data, leaderboard_markdown, leaderboard_table
+from .leaderboard_text import leaderboard_data, leaderboard_markdown, summary_caption, summary_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,11 +43,11 @@ class Board(Leaderboard):
         return leaderboard_markdown(self)
 
     def __str__(self) -> str:
-        return f"{leaderboard_table(self).to_text()}\n{leaderboard_caption(self)}."
+        return f"{summary_table(self).to_text()}\n{summary_caption(self)}."
 
     def _repr_html_(self) -> str:
         """Return the table for a notebook."""
-        return leaderboard_table(self).to_html()
+        return summary_table(self).to_html()
 
 
 def _shown(compute: Callable[P, Leaderboard]) -> Callable[P, Board]:

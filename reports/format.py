@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # a listing of runs must not wait for numeric libraries
 
 __all__ = [
     "cell_width",
+    "column_head",
     "column_title",
     "counted",
     "index_name",
@@ -29,6 +30,8 @@ __all__ = [
 
 _SCALES = {"fraction": 100.0, "bytes": 1e-6}
 _SYMBOLS = {"fraction": "%", "bytes": "MB", "ratio": "", "count": ""}
+#: Long words of titles, hyphenated for narrow columns.
+_HYPHENATED = {word: (word.removesuffix("ness") + "-", "ness") for word in ("completeness", "correctness")}
 #: Decimals of tables with many columns, and of tables where differences between values matter.
 _COARSE = {"fraction": 1, "ratio": 3, "m": 2, "px": 1, "count": 0, "s": 2, "bytes": 0}
 _FINE = {"fraction": 2, "count": 0, "s": 2, "bytes": 1}
@@ -79,14 +82,18 @@ def value_text(value: float | None, unit: str, *, fine: bool = False, undefined:
     return f"{number_text(value, unit, fine=fine)} {unit_text(unit)}".strip()
 
 
-def interval_text(low: float | None, high: float | None, unit: str, *, signed: bool = False, fine: bool = False) -> str:
-    """Return both ends of an interval; empty where there is none.
+def interval_text(
+    low: float | None, high: float | None, unit: str, *, signed: bool = False, fine: bool = False, coarse: bool = False
+) -> str:
+    """Return both ends of an interval; empty where there is none. `coarse`: fractions in whole percent.
 
     >>> interval_text(0.58, 0.995, "fraction"), interval_text(-0.1, 0.2, "m", signed=True)
     ('58.0–99.5', '-0.10 to +0.20')
     """
     if low is None or high is None:
         return ""
+    if coarse and unit == "fraction":
+        return f"{100 * low:.0f}–{100 * high:.0f}"
     ends = (number_text(end, unit, signed=signed, fine=fine) for end in (low, high))
     return (" to " if signed else "–").join(ends)
 
@@ -95,6 +102,13 @@ def column_title(index: Index, *, words: bool = False) -> str:
     """Return symbol (or title) and unit of an index: ``Q_l %``, ``quality %``."""
     name = index.title if words else index.symbol or index.title
     return f"{name} {unit_text(index.unit)}".strip()
+
+
+def column_head(index: Index) -> tuple[str, ...]:
+    """Return title and unit of an index on several short lines: ``("pixel", "correct-", "ness", "%")``."""
+    words = index.title.split()
+    parts = [part for word in words for part in _HYPHENATED.get(word, (word,))]
+    return (*parts, unit_text(index.unit))
 
 
 def index_name(index: Index) -> str:

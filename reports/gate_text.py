@@ -29,8 +29,10 @@ def gate_summary(result: GateResult) -> str:
     return {0: "passed", 1: "regression", 4: "nothing could be measured"}[result.exit_code] + f": {words}"
 
 
-def format_gate(result: GateResult, form: Literal["table", "md"]) -> str:
-    """Return the result as text for a terminal or as Markdown for a pull request."""
+def format_gate(result: GateResult, form: Literal["table", "md", "csv"]) -> str:
+    """Return the result as text for a terminal, as Markdown for a pull request, or as CSV with plain numbers."""
+    if form == "csv":
+        return _data(result).to_csv().rstrip("\n")
     table = Table.of(_COLUMNS, (_row(found, mark=form == "md") for found in result.conclusions))
     notes = list(dict.fromkeys(note for found in result.conclusions for note in _notes(found, result.level)))
     how = (
@@ -45,6 +47,26 @@ def format_gate(result: GateResult, form: Literal["table", "md"]) -> str:
         return "\n".join(lines).rstrip()
     failures = (f"failed: {text}" for text in result.failures)
     return "\n".join([sides, table.to_text(), how, *notes, *failures, f"Gate {gate_summary(result)}"])
+
+
+def _data(result: GateResult) -> Table:
+    names = (
+        "detector",
+        "index",
+        "conclusion",
+        "baseline",
+        "candidate",
+        "effect",
+        "low",
+        "high",
+        "margin",
+        "p",
+        "scenes",
+    )
+    rows = (
+        [found.index.key if name == "index" else getattr(found, name) for name in names] for found in result.conclusions
+    )
+    return Table.of(map(Column, names), rows)
 
 
 def _notes(found: IndexConclusion, level: float) -> Iterator[str]:

@@ -132,7 +132,9 @@ def _lead(report: Report) -> str:
     text += f" over {counted(len(board.scenes), 'scene')} and {best.reference:,} reference footprints"
     same = [_short(entry.label) for entry in ranked[1:] if set(entry.group) & set(best.group)]
     if same:
-        return f"{text}; the lead over {listed(same)} is not significant."
+        return f"{text}; the lead over {listed(same)} is not significant with {counted(len(board.scenes), 'scene')}."
+    if len(ranked) > 1 and not best.group:
+        text += "; there are too few scenes to test whether the lead is significant"
     rest = [
         f"{_short(entry.label)} {value_text(entry.cells[index.key].value, index.unit, undefined='no')}"
         for entry in ranked[1:4]

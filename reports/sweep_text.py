@@ -14,7 +14,7 @@ from .tables import Column, Table
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["break_down_text", "sweep_table"]
+__all__ = ["break_down_text", "sweep_records", "sweep_table"]
 
 
 def break_down_text(found: BreakDown) -> str:
@@ -51,6 +51,12 @@ def sweep_table(table: pd.DataFrame, axes: Sequence[str], index: Index) -> Table
         shown = [number_text(mean, index.unit), interval_text(low, high, index.unit)]
         rows.append([row["detector"], *values, *shown, *(row[name] for name in ("scenes", "failed", "skipped"))])
     return Table.of(columns, rows)
+
+
+def sweep_records(table: pd.DataFrame) -> Table:
+    """Return the tidy table for programs: every index of every evaluator, numbers as they are, None where undefined."""
+    rows = ([_known(value) for value in row] for row in table.astype(object).itertuples(index=False))
+    return Table.of(map(Column, table.columns), rows)
 
 
 def _known(value: Any) -> Any:

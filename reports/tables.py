@@ -33,11 +33,19 @@ class Column:
     align : {"left", "right"}
     fixed : bool
         Repeated in every part when a text table is split to fit a terminal.
+    head : tuple of str
+        The title on several lines, for text tables; the title itself where it is empty.
     """
 
     title: str
     align: Literal["left", "right"] = "right"
     fixed: bool = False
+    head: tuple[str, ...] = ()
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The title as lines of a text table."""
+        return self.head or (self.title,)
 
 
 @dataclass(frozen=True)
@@ -88,7 +96,9 @@ class Table:
         return "\n".join(line for part in parts for line in self._lines(cells, widths, [*fixed, *part]))
 
     def _lines(self, cells: list[list[str]], widths: Sequence[int], places: Sequence[int]) -> Iterator[str]:
-        columns = [[self.columns[p].title, "─" * widths[p], *cells[p]] for p in places]
+        height = max(len(self.columns[p].lines) for p in places)
+        heads = {p: [*[""] * (height - len(self.columns[p].lines)), *self.columns[p].lines] for p in places}
+        columns = [[*heads[p], "─" * widths[p], *cells[p]] for p in places]
         aligns = [self.columns[p].align for p in places]
         if all("".join(cells[p]).isascii() for p in places):
             # One template for a line: the text of 100 000 lines should appear at once.
@@ -111,7 +121,7 @@ class Table:
         ]
 
     def _widths(self, cells: Sequence[Sequence[str]]) -> list[int]:
-        return [_width([column.title, *texts]) for column, texts in zip(self.columns, cells, strict=True)]
+        return [_width([*column.lines, *texts]) for column, texts in zip(self.columns, cells, strict=True)]
 
     def _cut(self, cells: list[list[str]], fixed: Sequence[int], free: Sequence[int], width: int) -> None:
         """Shorten left-aligned columns, the widest first, until the fixed ones and any other fit."""

@@ -50,21 +50,22 @@ def make_leaderboard(
     Notes
     -----
     The unit is the scene: the value of a detector with several seeds on a scene is the mean over its seeds. Pooled
-    values add the tallies of all runs. A detector without a result on some scene has no rank, because its values are
-    over other scenes than those of the other detectors.
+    values add the tallies of all runs. Where a detector was skipped on a scene, because that lacks an input, all
+    detectors are compared on the other scenes. A detector that failed or never ran on one of these has no rank, because
+    its values are over other scenes than those of the other detectors.
     """
     evaluations = store.evaluations([row.id for row in rows if row.status == "ok"], keyed.evaluator, keyed.key)
     failures = store.evaluation_failures([row.id for row in rows if row.status == "ok"], keyed.key)
     counts = store.reference_counts()
     bare = tuple(dict.fromkeys(row.scene for row in rows if counts.get(row.scene_id, 0) is None))
     rows = [row for row in rows if row.scene not in bare]
-    scenes = tuple(dict.fromkeys(row.scene for row in rows))
+    scenes, skipping = _common_scenes(rows)
     indices = tuple(index for index in keyed.evaluator.indices if index.main)
     ranking = keyed.evaluator.ranking_index(rank_by)
-    if ranking.key not in [index.key for index in indices]:
-        indices = (*indices, ranking)
+    summary = keyed.evaluator.summary_indices(ranking)
+    indices = tuple(dict.fromkeys((*indices, *summary)))
     boards = [
-        _Tally(label, [row for row in rows if row.label == label], evaluations, keyed.evaluator, counts)
+        _Tally([row for row in rows if row.label == label], evaluations, keyed.evaluator, counts, scenes)
         for label in dict.fromkeys(row.label for row in rows)
     ]
     sign = -1 if ranking.better == "higher" else 1
@@ -82,34 +83,77 @@ def make_leaderboard(
         same = place > 0 and order(boards[place - 1]) == order(board)
         rank = None if not measured else entries[-1].rank if same else place + 1
         entries += board.entries(indices, rank=rank, group=groups.get(board.label, ""))
-    notes = [*group_note, *_notes(boards, scenes), *(f"{scene} has no reference and is left out" for scene in bare)]
+    notes = [
+        *skipping,
+        *group_note,
+        *_notes(boards, scenes),
+        *(f"{scene} has no reference and is left out" for scene in bare),
+    ]
     return Leaderboard(
         title=title,
         evaluator=_described(keyed.evaluator),
         rank_by=ranking,
         indices=indices,
+        summary=summary,
         entries=tuple(entries),
         scenes=scenes,
+        by_scene=_by_scene(rows, evaluations, ranking),
         notes=tuple(notes),
         unsuccessful=(*unsuccessful_runs(rows), *_unevaluated(rows, keyed, failures)),
     )
 
 
+def _common_scenes(rows: Sequence[RunRow]) -> tuple[tuple[str, ...], list[str]]:
+    """Return the scenes on which no detector was skipped, and a note on the others.
+
+    A detector that was skipped everywhere excludes no scene. Where none would be left, all scenes stay.
+    """
+    scenes = tuple(dict.fromkeys(row.scene for row in rows))
+    measured = {row.label for row in rows if row.status != "skipped"}
+    skipped: dict[str, dict[str, None]] = {}
+    for row in rows:
+        if row.status == "skipped" and row.label in measured:
+            skipped.setdefault(row.scene, {})[row.label] = None
+    common = tuple(scene for scene in scenes if scene not in skipped)
+    if not skipped or not common:
+        return scenes, []
+    lacking = "; ".join(f"{scene} (skipped by {', '.join(labels)})" for scene, labels in skipped.items())
+    return common, [f"Values are over the {len(common)} scenes that all detectors can use, without {lacking}"]
+
+
+def _by_scene(
+    rows: Sequence[RunRow], evaluations: Mapping[int, Evaluation], index: Index
+) -> dict[str, dict[str, float | None]]:
+    """Return per scene and detector the mean over seeds of an index; None where it is undefined."""
+    gathered: dict[str, dict[str, list[float]]] = {}
+    for row in rows:
+        cells = gathered.setdefault(row.scene, {})
+        if row.id in evaluations:
+            found = cells.setdefault(row.label, [])
+            value = evaluations[row.id].values[index.key]
+            found += [] if value is None else [value]
+    return {
+        scene: {label: statistics.fmean(found) if found else None for label, found in cells.items()}
+        for scene, cells in gathered.items()
+    }
+
+
 class _Tally:
-    """The runs of one detector, grouped by scene."""
+    """The runs of one detector; its values are over the given scenes."""
 
     def __init__(
         self,
-        label: str,
         rows: Sequence[RunRow],
         evaluations: Mapping[int, Evaluation],
         evaluator: Evaluator,
         references: Mapping[int, int | None],
+        scenes: Sequence[str],
     ) -> None:
-        self.label = label
+        self.label = rows[0].label
         self.rows = rows
         self._evaluator = evaluator
-        self._evaluated = [row for row in rows if row.id in evaluations]
+        self._done = [row for row in rows if row.status == "ok" and row.scene in scenes]
+        self._evaluated = [row for row in self._done if row.id in evaluations]
         self._evaluations = [evaluations[row.id] for row in self._evaluated]
         self._sum = evaluator.pool(self._evaluations) if self._evaluations else None
         self._reference = sum(references[row.scene_id] or 0 for row in self._evaluated)
@@ -169,7 +213,7 @@ class _Tally:
     def entries(self, indices: Iterable[Index], *, rank: int | None, group: str) -> list[Entry]:
         """Return the pooled and the mean entry."""
         indices = list(indices)
-        done = [row for row in self.rows if row.status == "ok"]
+        done = self._done
         entries = []
         for pooling, cell in (("pooled", self.pooled), ("mean", self.mean)):
             entries.append(
@@ -203,15 +247,12 @@ def _groups(boards: Sequence[_Tally], index: Index) -> tuple[dict[str, str], lis
     common = {(i, j): sorted(values[i].keys() & values[j].keys()) for i, j in pairs}
     fewest, needed = min(map(len, common.values())), scenes_needed(len(pairs))
     if fewest < needed:
-        return {}, [
-            f"too few scenes for significance tests by {index.title}: {len(pairs)} paired tests need {needed}, "
-            f"{fewest} available"
-        ]
+        return {}, [f"Too few scenes for significance tests: {needed} needed, {fewest} available"]
     p_values = [paired_p([values[i][scene] - values[j][scene] for scene in common[i, j]]) for i, j in pairs]
     differing = {pair for pair, p in zip(pairs, holm(p_values), strict=True) if p <= LEVEL}
     letters = letter_groups(len(boards), lambda i, j: (i, j) in differing)
     note = (
-        f"detectors that share a letter do not differ significantly in {index.title} (paired tests over {fewest} "
+        f"Detectors that share a letter do not differ significantly in {index.title} (paired tests over {fewest} "
         f"scenes, Holm, level {LEVEL:g})"
     )
     return {board.label: letter for board, letter in zip(boards, letters, strict=True)}, [note]

@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 
 from ...core.errors import InputError, RoofbenchError
-from ...evaluators.base import Index
 from ...evaluators.registry import DEFAULT
 from ..identity.provenance import code_version
 from ..plan import KeyedEvaluator
@@ -116,7 +115,7 @@ def fill_report(
     return Report(
         title=title,
         boards=tuple(board for _, board in evaluated),
-        matrix=_matrix(good, values, board.rank_by),
+        matrix=board.by_scene,
         scenes=() if drawn is None else drawn.scenes,
         errors=() if drawn is None else drawn.errors,
         sizes=() if drawn is None else drawn.sizes,
@@ -133,20 +132,6 @@ def fill_report(
 def _labels(board: Leaderboard) -> list[str]:
     """Return the detectors in the order of the board."""
     return list(dict.fromkeys(entry.label for entry in board.entries))
-
-
-def _matrix(rows: Sequence[RunRow], values: Values, index: Index) -> dict[str, dict[str, float | None]]:
-    """Return per scene and detector the mean over seeds of an index."""
-    gathered: dict[str, dict[str, list[float]]] = {}
-    for row in rows:
-        cell = gathered.setdefault(row.scene, {}).setdefault(row.label, [])
-        value = values.get(row.id, {}).get(index.key)
-        if value is not None:
-            cell.append(value)
-    return {
-        scene: {label: statistics.fmean(found) if found else None for label, found in cells.items()}
-        for scene, cells in gathered.items()
-    }
 
 
 def _costs(store: Store, rows: Sequence[RunRow], labels: Sequence[str]) -> tuple[CostPoint, ...]:

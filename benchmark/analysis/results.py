@@ -126,10 +126,16 @@ class Leaderboard:
         Name with the parameters that decide the values, such as the matching.
     rank_by : Index
     indices : tuple of Index
-        The columns.
+        The columns of the wide table.
+    summary : tuple of Index
+        The columns of the narrow table, the one that ranks first.
     entries : tuple of Entry
         Both poolings of every detector, in the order of rank.
     scenes : tuple of str
+        Those that the values are over.
+    by_scene : mapping of str to mapping of str to float
+        Scene, also of those that are left out of `scenes`, to detector label to the mean over seeds of the index that
+        ranks; None where that is undefined, absent where the detector has no result.
     notes : tuple of str
     unsuccessful : tuple of UnsuccessfulRun
         Failures, then skips.
@@ -139,8 +145,10 @@ class Leaderboard:
     evaluator: str
     rank_by: Index
     indices: tuple[Index, ...]
+    summary: tuple[Index, ...]
     entries: tuple[Entry, ...]
     scenes: tuple[str, ...]
+    by_scene: Mapping[str, Mapping[str, float | None]]
     notes: tuple[str, ...] = ()
     unsuccessful: tuple[UnsuccessfulRun, ...] = ()
 

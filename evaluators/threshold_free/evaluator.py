@@ -120,6 +120,13 @@ class ThresholdFree(Evaluator):
         "geometric.rmse",
     )
     swept_by: ClassVar[tuple[str, ...]] = ("object.quality", "pixel.quality")
+    summarised_by: ClassVar[tuple[str, ...]] = (
+        "object.quality",
+        "object.completeness",
+        "object.correctness",
+        "pixel.quality",
+        "geometric.rmse",
+    )
     verdict_kinds = VERDICT_KINDS
     measures = MEASURES
 

@@ -86,12 +86,14 @@ def make_report(labels=("first", "second"), scenes=("hamlet-1", "hamlet-2"), tit
         evaluator="threshold-free (matching nearest)",
         rank_by=QUALITY,
         indices=MAIN,
+        summary=(QUALITY,),
         entries=tuple(
             entry(label, pooling, rank, quality)
             for rank, (label, quality) in enumerate(zip(labels, (0.9, 0.5), strict=True), start=1)
             for pooling in ("pooled", "mean")
         ),
         scenes=scenes,
+        by_scene={name: dict.fromkeys(labels, 0.5) for name in scenes},
         notes=(f"a note on {labels[0]}",),
     )
     views = tuple(view(name, labels, seed) for seed, name in enumerate(scenes, start=1))

@@ -284,7 +284,7 @@ def test_files_are_written_before_a_table_that_nobody_reads(cli, misbehaving, tm
     from roofbench.cli import sweep
     from roofbench.reports import leaderboard_text
 
-    def closed(*_):
+    def closed(*_, **__):
         raise BrokenPipeError
 
     monkeypatch.setattr(leaderboard_text, "print_leaderboard", closed)

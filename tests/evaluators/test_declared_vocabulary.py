@@ -21,7 +21,7 @@ HAMLETS = ["hamlet[seed=1]", "hamlet[seed=2]"]
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
     folder = tmp_path_factory.mktemp("toy")
-    answer = roofbench("run", *HAMLETS, "-d", "ndsm", "-e", TOY, "-j", 0, "-o", "out", folder=folder)
+    answer = roofbench("run", *HAMLETS, "-d", "ndsm", "-e", TOY, "-j", 0, "-o", "out", "--wide", folder=folder)
     return folder, answer.stdout
 
 

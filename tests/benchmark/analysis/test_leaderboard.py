@@ -105,6 +105,30 @@ def test_an_undefined_value_and_a_missing_scene_have_no_rank():
     assert "half has no rank: it has a result on 1 of 2 scenes" in board.notes
 
 
+def test_detectors_are_compared_on_the_scenes_that_none_of_them_skips():
+    runs = Runs()
+    for scene, found in ((1, 2), (2, 8), (3, 8)):
+        runs.add("any", scene, found)
+        runs.add("colour", scene, 9, **({"status": "skipped", "reason": "no image"} if scene == 1 else {}))
+        runs.add("nowhere", scene, status="skipped", reason="no image")
+    board = runs.board()
+    assert board.scenes == ("hamlet-2", "hamlet-3")
+    assert ranks(board) == {"colour": 1, "any": 2, "nowhere": None}
+    assert cell(board, "any", "object.completeness").value == pytest.approx(16 / 20)
+    assert board.by_scene["hamlet-1"] == {"any": pytest.approx(0.2)}
+    assert board.by_scene["hamlet-2"] == {"any": pytest.approx(0.8), "colour": pytest.approx(0.9)}
+    assert board.notes[0] == (
+        "Values are over the 2 scenes that all detectors can use, without hamlet-1 (skipped by colour)"
+    )
+
+
+def test_where_every_scene_is_skipped_by_some_detector_all_scenes_stay():
+    runs = Runs().add("a", 1, 8).add("a", 2, status="skipped").add("b", 1, status="skipped").add("b", 2, 8)
+    board = runs.board()
+    assert board.scenes == ("hamlet-1", "hamlet-2")
+    assert ranks(board) == {"a": None, "b": None}
+
+
 def test_pooled_adds_objects_and_mean_averages_scenes():
     runs = Runs().add("d", 1, 10, of=10).add("d", 2, 10, of=40)
     board = runs.board()
@@ -146,14 +170,14 @@ def test_detectors_without_a_significant_difference_share_a_letter():
     letters = {entry.label: entry.group for entry in board.entries}
     assert letters["good"] == letters["as good"] != letters["bad"]
     assert board.notes == (
-        "detectors that share a letter do not differ significantly in quality (paired tests over 10 scenes, Holm, "
+        "Detectors that share a letter do not differ significantly in quality (paired tests over 10 scenes, Holm, "
         "level 0.05)",
     )
 
 
 def test_too_few_scenes_for_tests_are_said_with_the_number_needed():
     board = Runs().add("a", 1, 8).add("b", 1, 5).board()
-    assert board.notes == ("too few scenes for significance tests by quality: 1 paired tests need 6, 1 available",)
+    assert board.notes == ("Too few scenes for significance tests: 6 needed, 1 available",)
     assert {entry.group for entry in board.entries} == {""}
 
 
