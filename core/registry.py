@@ -48,8 +48,8 @@ def parse_assignment(text: str) -> tuple[str, str]:
 def parse_selection(text: str) -> tuple[str, dict[str, str]]:
     """Read ``name[parameter=value,parameter=value]``.
 
-    >>> parse_selection("original[tile_size=400, ground=tile-dem]")
-    ('original', {'tile_size': '400', 'ground': 'tile-dem'})
+    >>> parse_selection("original[ground_tile=400, ground=tile-dem]")
+    ('original', {'ground_tile': '400', 'ground': 'tile-dem'})
     """
     match = _SELECTION.match(text.strip())
     if match is None:

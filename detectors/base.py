@@ -10,7 +10,7 @@ any number of workers.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -35,15 +35,32 @@ class Detector(Parameterised, ABC):
         Inputs without which it is skipped: ``points``, ``image``, ``colour``, ``nir``, ``dem``.
     stochastic : bool
         Whether different seeds give different footprints.
+    halo : float
+        Metres around a tile that it sees besides the tile, when a city is detected by tiles (`detectors.tiling`):
+        wider than half a building and than whatever decides a footprint from afar.
+    numbers : tuple of str
+        Attributes that number buildings within one result; they are made unique over tiles.
+    place_streams : bool
+        Whether its random streams already follow from absolute places, so that all tiles may share one seed.
     """
 
     name: ClassVar[str]
     requires: ClassVar[tuple[str, ...]] = ("points",)
     stochastic: ClassVar[bool] = False
+    halo: ClassVar[float] = 150.0
+    numbers: ClassVar[tuple[str, ...]] = ()
+    place_streams: ClassVar[bool] = False
 
     @abstractmethod
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Return the footprints of the buildings in a scene; none is a valid result."""
+
+    def measured(self, scene: Scene) -> Mapping[str, float]:
+        """Return parameters that are unset and that `detect` would measure on this scene, such as a cell size.
+
+        Tiles of a city share these values, so that no seam separates two cell sizes.
+        """
+        return {}
 
     def fingerprint(self) -> str:
         """Return a digest of what it reads besides the scene (a program, footprints made elsewhere); empty for none.

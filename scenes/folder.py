@@ -19,6 +19,7 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +31,6 @@ from ..core.output import whole_folder
 from ..core.registry import nearest_hint
 from .geodata.crs import require_metric
 from .geodata.footprints import Footprints
-from .geodata.points import PointCloud
-from .geodata.raster import Elevation, Image
 from .scene import Scene
 from .shipped import shipped_names, shipped_or_given
 
@@ -89,7 +88,7 @@ def open_scene(path: str | os.PathLike[str]) -> Scene:
     files: dict[str, Mapping[str, Any]] = manifest.get("files", {})
     sources: dict[str, Any] = {}
     for kind in files:
-        sources[kind] = _reader(kind, folder / FILES[kind], manifest)
+        sources[kind] = _LayerFile(kind, folder / FILES[kind], files[kind])
     facts: dict[str, Any] = {key: manifest[key] for key in ("source", "licence", "notes", "derived") if key in manifest}
     facts.update(manifest.get("facts", {}))
     return Scene(
@@ -248,35 +247,45 @@ def _manifest_problem(manifest: Mapping[str, Any]) -> str | None:
     return None
 
 
-def _reader(kind: str, file: Path, manifest: Mapping[str, Any]) -> Any:
-    """Return the function that reads one file of a scene."""
+@dataclass(frozen=True)
+class _LayerFile:
+    """One file of a scene folder, read when it is called or by window."""
 
-    def points() -> PointCloud:
-        from .geodata.las_files import read_points
+    kind: str
+    file: Path
+    entry: Mapping[str, Any]
 
-        return read_points(file)
+    def __call__(self) -> Any:
+        return self._read(None)
 
-    def image() -> Image:
-        from .geodata.raster_files import read_image
+    def window(self, extent: tuple[float, float, float, float]) -> Any:
+        if self.kind == "area":
+            return shapely.intersection(self._read(None), shapely.box(*extent))
+        if self.kind == "reference":
+            reference = self._read(None)
+            return reference.take(shapely.intersects(reference.polygons, shapely.box(*extent)))
+        return self._read(extent)
 
-        return read_image(file, bands=manifest["files"]["image"].get("bands"))
+    def digest(self, extent: tuple[float, float, float, float]) -> str:
+        return f"{self.kind} {self.entry['sha256']}"
 
-    def dem() -> Elevation:
-        from .geodata.raster_files import read_elevation
+    def _read(self, extent: tuple[float, float, float, float] | None) -> Any:
+        if self.kind == "points":
+            from .geodata.las_files import read_points
 
-        return read_elevation(file)
+            return read_points(self.file, window=extent)
+        if self.kind == "image":
+            from .geodata.raster_files import read_image
 
-    def reference() -> Footprints:
+            return read_image(self.file, bands=self.entry.get("bands"), window=extent)
+        if self.kind == "dem":
+            from .geodata.raster_files import read_elevation
+
+            return read_elevation(self.file, window=extent)
         from .geodata.vector_files import read_footprints
 
-        return read_footprints(file)
-
-    def area() -> shapely.Geometry:
-        from .geodata.vector_files import read_footprints
-
-        return shapely.union_all(read_footprints(file).polygons)
-
-    return {"points": points, "image": image, "dem": dem, "reference": reference, "area": area}[kind]
+        found = read_footprints(self.file)
+        return found if self.kind == "reference" else shapely.union_all(found.polygons)
 
 
 def _write_reference(reference: Footprints, file: Path, crs: str | None) -> None:

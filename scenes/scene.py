@@ -8,8 +8,9 @@ What a detector gets is `Scene.for_detection`: measurements only, neither refere
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack, runtime_checkable
 
 import numpy as np
 import shapely
@@ -22,7 +23,7 @@ from .geodata.raster import Elevation, Grid, Image
 if TYPE_CHECKING:
     from .ground.heights import Heights
 
-__all__ = ["INPUTS", "Layers", "Scene"]
+__all__ = ["INPUTS", "LayerFiles", "Layers", "Scene"]
 
 #: What a detector may require, and how it is named to people.
 INPUTS: Mapping[str, str] = {
@@ -45,6 +46,20 @@ class Layers(TypedDict, total=False):
 
 
 _LAYERS = tuple(Layers.__annotations__)
+
+
+@runtime_checkable
+class LayerFiles(Protocol):
+    """A layer in files: called, it reads the whole; a window reads its part alone."""
+
+    def __call__(self) -> Any:
+        """Read the layer."""
+
+    def window(self, extent: tuple[float, float, float, float]) -> Any:
+        """Read the part inside ``(xmin, ymin, xmax, ymax)``, metres."""
+
+    def digest(self, extent: tuple[float, float, float, float]) -> str:
+        """Return a text that changes when the files that hold this part change; they are not read."""
 
 
 class Scene:
@@ -89,6 +104,8 @@ class Scene:
         self._content_hash = content_hash
         self._heights: Heights | None = None
         self._is_for_detection = False
+        #: Cell size of the ground filter, metres, which windows take over; None: from the density of the points.
+        self.ground_cell: float | None = None
 
     @property
     def contents(self) -> tuple[str, ...]:
@@ -129,7 +146,7 @@ class Scene:
             # The ground filter is compiled code, which takes a while to load.
             from .ground.heights import heights_of
 
-            self._heights = heights_of(self.points, self.dem, self.extent)
+            self._heights = heights_of(self.points, self.dem, self.extent, cell=self.ground_cell)
         return self._heights
 
     @property
@@ -185,6 +202,68 @@ class Scene:
         if reason:
             raise MissingInputError(reason)
 
+    def window(self, extent: Sequence[float], halo: float = 0.0) -> Scene:
+        """Return the part of the scene inside an extent, read by window where the layers lie in files.
+
+        Reference footprints that meet the window are kept whole. The ground of the part is that of its own DEM and
+        points, so that away from its border it is that of the scene (set `ground_cell` where there is no complete DEM);
+        take a `halo` of the width that does not count.
+
+        Parameters
+        ----------
+        extent : sequence of float
+            ``(xmin, ymin, xmax, ymax)``, metres.
+        halo : float
+            Metres around the extent that belong to the part, too.
+
+        Raises
+        ------
+        InputError
+            The extent does not meet the scene.
+        """
+        (xmin, ymin, xmax, ymax), own = extent, self.extent
+        low_x, low_y = max(xmin - halo, own[0]), max(ymin - halo, own[1])
+        high_x, high_y = min(xmax + halo, own[2]), min(ymax + halo, own[3])
+        if not (high_x > low_x and high_y > low_y):
+            raise InputError(f"scene {self.name!r} lies in {own}: the window {tuple(extent)} does not meet it")
+        wanted = (low_x, low_y, high_x, high_y)
+        layers: Layers = {}
+        for name in _LAYERS:
+            if self._sources[name] is not None:
+                layers[name] = partial(self._part, name, wanted)  # type: ignore[literal-required]
+        part = Scene(
+            self.name,
+            wanted,
+            crs=self.crs,
+            facts=self.facts,
+            content_hash=partial(self._part_hash, wanted),
+            **layers,
+        )
+        part.ground_cell = self.ground_cell
+        return part
+
+    def _part(self, name: str, extent: tuple[float, float, float, float]) -> Any:
+        """Return a layer inside an extent; a layer in files is not kept."""
+        source = self._sources[name]
+        if isinstance(source, LayerFiles):
+            return source.window(extent)
+        value = self._get(name)
+        if value is None:
+            return None
+        if name == "area":
+            return shapely.intersection(value, shapely.box(*extent))
+        if name == "reference":
+            return value.take(shapely.intersects(value.polygons, shapely.box(*extent)))
+        return value.window(extent)
+
+    def _part_hash(self, extent: tuple[float, float, float, float]) -> str:
+        sources = [source for source in self._sources.values() if source is not None]
+        if all(isinstance(source, LayerFiles) for source in sources):
+            files = [source.digest(extent) for source in sources]
+        else:
+            files = [self.content_hash]
+        return hashlib.sha256(repr((extent, self.crs, files)).encode()).hexdigest()
+
     def for_detection(self) -> Scene:
         """Return the scene as a detector may see it: no reference, no area, no classification, no generator facts.
 
@@ -207,6 +286,7 @@ class Scene:
             dem=(lambda: self.dem) if held["dem"] is not None else None,
             content_hash=lambda: self.content_hash,
         )
+        seen.ground_cell = self.ground_cell
         seen._is_for_detection = True
         return seen
 

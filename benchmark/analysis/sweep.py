@@ -3,7 +3,7 @@
 Nouns
 -----
 axis
-    A parameter of the detector (``tile_size``) or of the generator (``scene.tree_density``) with its values; None is
+    A parameter of the detector (``ground_tile``) or of the generator (``scene.tree_density``) with its values; None is
     the default.
 point
     One value on one axis, the others at their defaults; or, in a grid, one value on every axis.
@@ -51,7 +51,7 @@ _SCENE = "scene."
 
 @dataclass(frozen=True)
 class Axis:
-    """A varied parameter, ``tile_size`` or ``scene.slope``, and its values in order."""
+    """A varied parameter, ``ground_tile`` or ``scene.slope``, and its values in order."""
 
     name: str
     values: tuple[Any, ...]
@@ -81,7 +81,7 @@ class Sweep:
 
 
 def axis_of(text: str) -> Axis:
-    """Read ``tile_size=400,450,500`` or ``scene.slope=0:20:5`` (from, to, step, the end included).
+    """Read ``ground_tile=400,450,500`` or ``scene.slope=0:20:5`` (from, to, step, the end included).
 
     >>> axis_of("scene.slope=0:20:5").values
     (0, 5, 10, 15, 20)

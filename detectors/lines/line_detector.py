@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -142,6 +142,12 @@ class LineDetector(LineParameters):
         rectangles = np.stack([x, y], axis=-1)
         return Footprints.from_rectangles(rectangles, crs=scene.crs, metadata=found.counts(), source=self.name)
 
+    def measured(self, scene: Scene) -> Mapping[str, float]:
+        """Return the pulse spacing, unless it is given."""
+        if self.spacing is not None or scene.points is None or scene.image is None or not len(scene.points):
+            return {}
+        return {"spacing": pulse_spacing(scene.points, scene.image.grid)}
+
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
         """Return the masks, the lines, the rectangles and, where used, the votes and the histograms."""
         return line_steps(self.trace(scene))
@@ -151,8 +157,8 @@ class LineDetector(LineParameters):
         assert points is not None
         assert image is not None
         grid = image.grid
-        tile_side = self.tile_size * (PAPER_PIXEL if self.tile_pixel == "printed" else grid.gsd)
-        spacing = pulse_spacing(points, grid)
+        tile_side = self.ground_tile * (PAPER_PIXEL if self.tile_pixel == "printed" else grid.gsd)
+        spacing = self.spacing or pulse_spacing(points, grid)
         surface = None if self.ground == "tile-mode" or not len(points) else scene.heights.ground
         ground = ground_heights(points, surface, method=self.ground, tile_side=tile_side)
         if self.ground == "point-dem" and self.below_ground < 1 and len(points):

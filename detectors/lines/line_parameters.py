@@ -6,9 +6,11 @@ in pixels of the scene, so that the values do not depend on the ground sampling 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
+from ...core.errors import ParameterError
 from ...core.parameters import parameter
 from ..base import Detector
 
@@ -27,6 +29,7 @@ class LineParameters(Detector):
     """
 
     requires: ClassVar[tuple[str, ...]] = ("points", "colour")
+    halo: ClassVar[float] = 150.0
 
     mode: str = parameter(
         "default", choices=("default", "paper", "program"),
@@ -45,13 +48,18 @@ class LineParameters(Detector):
         "(`ground=point-dem`); 1 never lowers it, as printed",
         source="2011, 3.1; reading",
     )  # fmt: skip
-    tile_size: float = parameter(
+    ground_tile: float = parameter(
         450, unit="px of 0.15 m", minimum=20, swept=(400, 450, 500, 550, 600),
         doc="side of the tiles with one ground height each", source="2010, 3.2 and 4.4.1",
     )  # fmt: skip
     tile_pixel: str = parameter(
         "printed", choices=("printed", "image"),
-        doc="pixel that `tile_size` counts: 0.15 m as in the papers, or that of the image", source="reading",
+        doc="pixel that `ground_tile` counts: 0.15 m as in the papers, or that of the image", source="reading",
+    )  # fmt: skip
+    spacing: float | None = parameter(
+        None, unit="m", minimum=0.01,
+        doc="distance of neighbouring pulses that lengths follow; none: measured as the median of the scene",
+        source="reading",
     )  # fmt: skip
     height: float = parameter(
         2.5, unit="m", minimum=0, doc="least height above ground of a building", source="2010, 3.2"
@@ -261,3 +269,10 @@ class LineParameters(Detector):
         doc="largest angle between final rectangles that are parallel or perpendicular",
         source="2010, 3.4; reading",
     )  # fmt: skip
+
+    @classmethod
+    def build(cls, values: Mapping[str, Any] | None = None) -> Self:
+        """Build from a mapping; the former name of `ground_tile` is refused with the new one."""
+        if "tile_size" in (values or {}):
+            raise ParameterError(f"{cls.name}: no parameter 'tile_size': it is called ground_tile now")
+        return super().build(values)

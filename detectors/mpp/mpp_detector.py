@@ -7,6 +7,7 @@ Remote Sensing Letters 4(11), 1127-1136: a valid sampler of a repaired model wit
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -20,7 +21,7 @@ from ...scenes.scene import Scene
 from ..base import Detector
 from ..steps import Step
 from .arrays import Mask, Rectangles
-from .cells import has_points
+from .cells import cell_size, has_points
 from .city import join_traces, sample_city, total_energy
 from .energy import rectangle_energies
 from .memory import release_memory
@@ -55,6 +56,8 @@ class MPP(MPPParameters, Detector):
     name: ClassVar[str] = "mpp"
     requires: ClassVar[tuple[str, ...]] = ("points",)
     stochastic: ClassVar[bool] = True
+    numbers: ClassVar[tuple[str, ...]] = ("part_of",)
+    place_streams: ClassVar[bool] = True
 
     @classmethod
     def build(cls, values: Mapping[str, Any] | None = None) -> Self:
@@ -74,6 +77,18 @@ class MPP(MPPParameters, Detector):
         if prepared is None:
             return
         yield from mpp_steps(prepared, found.polygons, found.metadata["trace"])
+
+    @property
+    def halo(self) -> float:  # type: ignore[override]
+        """Twice the longest diagonal of a rectangle, metres."""
+        return 2 * math.sqrt(2) * self.largest_side
+
+    def measured(self, scene: Scene) -> Mapping[str, float]:
+        """Return the cell size, unless it is given."""
+        points = scene.points
+        if self.cell is not None or points is None or not len(points):
+            return {}
+        return {"cell": cell_size(points.x, points.y, scene.extent)}
 
     def _evident(self, prepared: Prepared, rectangles: Rectangles) -> Mask:
         """Return which rectangles look like a roof on the whole, not only in sum.

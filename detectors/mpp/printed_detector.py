@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -56,6 +56,7 @@ class MPPPrinted(Detector):
     name: ClassVar[str] = "mpp-printed"
     requires: ClassVar[tuple[str, ...]] = ("points",)
     stochastic: ClassVar[bool] = True
+    halo: ClassVar[float] = 340.0
 
     heights: str = parameter(
         "elevation",
@@ -226,6 +227,13 @@ class MPPPrinted(Detector):
             metadata=record,
             source=self.name,
         )
+
+    def measured(self, scene: Scene) -> Mapping[str, float]:
+        """Return the cell size, unless it is given."""
+        points = scene.points
+        if self.cell is not None or points is None or not len(points):
+            return {}
+        return {"cell": cell_size(points.x, points.y, scene.extent)}
 
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
         """Yield the convergence and the rectangles of the same run."""

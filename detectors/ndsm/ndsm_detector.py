@@ -13,7 +13,7 @@ The detector has no training and no random numbers: the same points give the sam
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,7 +27,7 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.outlines import coverage_of_mask, minimum_rectangles, trace
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
-from ...scenes.ground.heights import heights_of
+from ...scenes.ground.heights import Heights, heights_of
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..shared.cues import CellCues, cell_cues, greenness
@@ -53,6 +53,7 @@ class NDSM(Detector):
 
     name = "ndsm"
     requires = ("points",)
+    halo = 64.0
 
     height: float = parameter(
         2.5,
@@ -138,8 +139,7 @@ class NDSM(Detector):
         assert scene.points is not None
         # Duplicate points would count as evidence for a plane.
         points = scene.points.distinct()
-        ground = scene.heights if self.dem else heights_of(scene.points, None, scene.extent)
-        heights = ground.above(points)
+        heights = self._ground(scene).above(points)
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
         high = np.nan_to_num(cues.high_share) >= 0.5
@@ -158,6 +158,16 @@ class NDSM(Detector):
             traced=traced,
             footprints=self._footprints(traced, cues, likeness, scene.crs),
         )
+
+    def measured(self, scene: Scene) -> Mapping[str, float]:
+        """Return the cell size, unless it is given."""
+        if self.cell is not None or scene.points is None or not len(scene.points):
+            return {}
+        points = scene.points.distinct()
+        return {"cell": default_cell(points, self._ground(scene).above(points), scene.extent)}
+
+    def _ground(self, scene: Scene) -> Heights:
+        return scene.heights if self.dem else heights_of(scene.points, None, scene.extent, cell=scene.ground_cell)
 
     def _vegetation(self, scene: Scene, grid: Grid) -> tuple[_Floats, float] | None:
         """Return the vegetation index of the image per cell and its threshold."""

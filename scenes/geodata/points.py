@@ -8,6 +8,7 @@ never see the classification: it is an interpretation, not a measurement.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,6 +56,11 @@ class PointCloud:
             column = getattr(self, field.name)
             columns[field.name] = None if column is None else column[index]
         return PointCloud(**columns)
+
+    def window(self, extent: Sequence[float]) -> PointCloud:
+        """Return the points in ``[xmin, ymin, xmax, ymax]``, its border included."""
+        xmin, ymin, xmax, ymax = extent
+        return self.take((self.x >= xmin) & (self.x <= xmax) & (self.y >= ymin) & (self.y <= ymax))
 
     def repeats(self) -> NDArray[np.bool_]:
         """Return which points equal an earlier one in everything, shape (n,): tiles that overlap hold some twice.

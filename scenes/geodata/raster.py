@@ -73,6 +73,24 @@ class Grid:
         south, east = self.north - self.rows * self.gsd, self.west + self.columns * self.gsd
         return self.west, south, east, self.north
 
+    def part(self, extent: Sequence[float]) -> tuple[slice, slice] | None:
+        """Return the rows and columns of the cells that ``[xmin, ymin, xmax, ymax]`` meets; None when it meets none.
+
+        >>> Grid(0, 10, 0.5, 20, 20).part((1.2, 7, 2, 20))
+        (slice(0, 6, None), slice(2, 4, None))
+        """
+        xmin, ymin, xmax, ymax = extent
+        top = max(math.floor((self.north - ymax) / self.gsd + 1e-9), 0)
+        bottom = min(math.ceil((self.north - ymin) / self.gsd - 1e-9), self.rows)
+        left = max(math.floor((xmin - self.west) / self.gsd + 1e-9), 0)
+        right = min(math.ceil((xmax - self.west) / self.gsd - 1e-9), self.columns)
+        return (slice(top, bottom), slice(left, right)) if top < bottom and left < right else None
+
+    def cut(self, rows: slice, columns: slice) -> Grid:
+        """Return the grid of some of its cells."""
+        west, north = self.west + columns.start * self.gsd, self.north - rows.start * self.gsd
+        return Grid(west, north, self.gsd, rows.stop - rows.start, columns.stop - columns.start)
+
     @property
     def transform(self) -> tuple[float, float, float, float, float, float]:
         """Affine coefficients ``(a, b, c, d, e, f)`` as rasterio writes them."""
@@ -142,6 +160,14 @@ class Image:
         scaled: NDArray[np.float32] = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
         return scaled
 
+    def window(self, extent: Sequence[float]) -> Image | None:
+        """Return the cells that an extent meets, not copied; None when it meets none."""
+        part = self.grid.part(extent)
+        if part is None:
+            return None
+        valid = None if self.valid is None else self.valid[part]
+        return Image(self.values[:, *part], self.bands, self.grid.cut(*part), valid)
+
     @property
     def is_colour(self) -> bool:
         """Whether red, green and blue are all there."""
@@ -161,6 +187,11 @@ class Elevation:
 
     values: NDArray[np.float32]
     grid: Grid
+
+    def window(self, extent: Sequence[float]) -> Elevation | None:
+        """Return the cells that an extent meets, not copied; None when it meets none."""
+        part = self.grid.part(extent)
+        return None if part is None else Elevation(self.values[part], self.grid.cut(*part))
 
     def sample(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Return bilinear elevation at points, shape of `x`; clamped at the border, NaN beside unknown cells."""

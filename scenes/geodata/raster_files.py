@@ -151,8 +151,10 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
         )
 
 
-def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = None) -> Image:
-    """Read an orthoimage whole, on its own grid.
+def read_image(
+    path: str | os.PathLike[str], *, bands: Sequence[str] | None = None, window: Sequence[float] | None = None
+) -> Image:
+    """Read an orthoimage on its own grid, whole or the cells that a window meets.
 
     Parameters
     ----------
@@ -160,24 +162,39 @@ def read_image(path: str | os.PathLike[str], *, bands: Sequence[str] | None = No
     bands : sequence of str, optional
         Names in the order of the file; ``"-"`` skips one. Without it the descriptions in the file, else by number:
         1 grey, 3 red, green, blue, 4 red, green, blue, nir.
+    window : sequence of float, optional
+        ``(xmin, ymin, xmax, ymax)``, metres; `InputError` where the image does not meet it.
     """
     header = _square(read_raster_header(path))
     names = band_names(header, bands)
     require_image_type(header)
+    part = _part(header, window)
     with opened(header.path, opaque=is_opaque(header, names)) as source:
         indexes, kept = _band_indexes(names)
-        values = source.read(indexes)
-        valid = data_mask(source)
-    return Image(values, kept, header.grid, None if valid.all() else valid)
+        values = source.read(indexes, window=part)
+        valid = data_mask(source, part)
+    return Image(values, kept, header.grid.cut(*part), None if valid.all() else valid)
 
 
-def read_elevation(path: str | os.PathLike[str]) -> Elevation:
-    """Read an elevation model whole, on its own grid; cells without data are NaN."""
+def read_elevation(path: str | os.PathLike[str], *, window: Sequence[float] | None = None) -> Elevation:
+    """Read an elevation model on its own grid, whole or as in `read_image`; cells without data are NaN."""
     header = _square(read_raster_header(path))
+    part = _part(header, window)
     with opened(header.path) as source:
-        values = source.read(1, masked=True).astype(np.float32).filled(np.nan)
+        values = source.read(1, masked=True, window=part).astype(np.float32).filled(np.nan)
         values = values * np.float32(header.scale) + np.float32(header.offset)
-    return Elevation(values, header.grid)
+    return Elevation(values, header.grid.cut(*part))
+
+
+def _part(header: RasterHeader, window: Sequence[float] | None) -> tuple[slice, slice]:
+    """Return rows and columns of a window."""
+    grid = header.grid
+    if window is None:
+        return slice(0, grid.rows), slice(0, grid.columns)
+    part = grid.part(window)
+    if part is None:
+        raise InputError(f"{header.path} does not reach into the window {tuple(window)}: choose another one")
+    return part
 
 
 def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, ...]:
@@ -387,12 +404,12 @@ def require_image_type(header: RasterHeader) -> None:
         )
 
 
-def data_mask(source: Any) -> NDArray[np.bool_]:
+def data_mask(source: Any, part: tuple[slice, slice] | None = None) -> NDArray[np.bool_]:
     """Return where a raster has data, shape (rows, columns): by its alpha band, else by its mask or no-data values.
 
     GDAL itself regards an alpha band only beside one or three bands of whole numbers.
     """
     alpha = [index for index, colour in enumerate(source.colorinterp, start=1) if colour.name == "alpha"]
     if alpha:
-        return np.asarray(source.read(alpha[-1]) > 0)
-    return np.asarray(source.dataset_mask() > 0)
+        return np.asarray(source.read(alpha[-1], window=part) > 0)
+    return np.asarray(source.dataset_mask(window=part) > 0)

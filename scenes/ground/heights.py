@@ -72,7 +72,9 @@ class Heights:
         return heights
 
 
-def heights_of(points: PointCloud | None, dem: Elevation | None, extent: Sequence[float]) -> Heights:
+def heights_of(
+    points: PointCloud | None, dem: Elevation | None, extent: Sequence[float], *, cell: float | None = None
+) -> Heights:
     """Return the heights above ground of a place.
 
     A DEM that is known in the whole extent is the ground itself, not a copy of it. Without a finite point the voids of
@@ -85,10 +87,12 @@ def heights_of(points: PointCloud | None, dem: Elevation | None, extent: Sequenc
         Bare earth; None to filter all of it from the points.
     extent : sequence of float
         ``(xmin, ymin, xmax, ymax)``, metres.
+    cell : float, optional
+        Cell size of the ground filter, metres; by default from the density of the points.
     """
     if dem is not None and _is_complete(dem, extent):
         return Heights(dem)
-    filtered = None if points is None else ground_surface(points, extent)
+    filtered = None if points is None else ground_surface(points, extent, cell=cell)
     if filtered is not None and np.isnan(filtered.values).all():
         filtered = None
     if dem is None:

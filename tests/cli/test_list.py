@@ -56,7 +56,7 @@ def test_a_selection_is_explained_with_the_values_of_its_mode_and_readings_apart
     for shown in ("mode [paper]", "rise [0.05]", "marking [squares]", "neighbourhood [0.75 m]"):
         assert shown in text
     printed, _, readings = text.partition("Readings of what the source leaves open")
-    assert "tile_size [450 px of 0.15 m]" in printed
+    assert "ground_tile [450 px of 0.15 m]" in printed
     assert "marking [squares]" in readings
 
 

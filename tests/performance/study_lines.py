@@ -90,14 +90,14 @@ PICTURED = {
 }
 #: The five parameters of figure 8 and the values of section 4.4.1.
 SENSITIVITY = {
-    "tile_size": (400, 450, 500, 550, 600),
+    "ground_tile": (400, 450, 500, 550, 600),
     "black_share": (0.6, 0.7, 0.8, 0.9, 1.0),
     "vegetation_threshold": (32, 40, 48, 56, 64),
     "reduction": (0.10, 0.15, 0.20, 0.25, 0.30),
     "colour_similarity": (0.2, 0.3, 0.4, 0.5, 0.6),
 }
 LABELS = {
-    "tile_size": "tile size (px of 0.15 m)",
+    "ground_tile": "tile size (px of 0.15 m)",
     "black_share": "black pixel threshold",
     "vegetation_threshold": "vegetation threshold",
     "reduction": "area reduction",
@@ -267,7 +267,7 @@ def above_tile(scene):
     from roofbench.detectors.lines.masks import ground_heights
 
     original, cloud = rb.make_detector("original"), scene.points
-    side = original.values()["tile_size"] * PAPER_PIXEL
+    side = original.values()["ground_tile"] * PAPER_PIXEL
     limit = ground_heights(cloud, scene.dem, method="tile-dem", tile_side=side) + original.values()["height"]
     tree = shapely.STRtree(shapely.points(cloud.x, cloud.y))
     high = [

@@ -31,7 +31,7 @@ def store(tmp_path):
 
 
 def test_axes_are_lists_or_ranges():
-    assert axis_of("tile_size=400, 450,500").values == (400, 450, 500)
+    assert axis_of("ground_tile=400, 450,500").values == (400, 450, 500)
     assert axis_of("scene.slope=0:1:0.25").values == (0, 0.25, 0.5, 0.75, 1.0)
     assert axis_of("mode=good,raises").values == ("good", "raises")
     for wrong in ("slope", "slope=", "slope=0:5:0", "slope=5:0:1", "slope=1,1"):

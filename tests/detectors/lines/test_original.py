@@ -136,12 +136,17 @@ def test_near_infrared_is_used_where_there_is_some():
 
 
 def test_the_detector_is_found_by_name_and_checks_its_parameters():
-    assert make_detector("original[tile_size=500,ground=tile-mode]").changed() == {
-        "tile_size": 500.0,
+    assert make_detector("original[ground_tile=500,ground=tile-mode]").changed() == {
+        "ground_tile": 500.0,
         "ground": "tile-mode",
     }
     with pytest.raises(ParameterError, match="reduction"):
         make_detector("original[reduction=3]")
+
+
+def test_the_former_name_of_the_ground_tile_is_answered_with_the_new_one():
+    with pytest.raises(ParameterError, match="ground_tile"):
+        make_detector("improved[tile_size=500]")
 
 
 def test_on_a_slope_the_tile_ground_fails_and_the_point_ground_does_not():
