@@ -9,6 +9,7 @@ from ..benchmark.plan import differences, identity_now
 from ..benchmark.store.records import RunRow
 from ..benchmark.store.writer import Store
 from ..core.errors import RoofbenchError
+from .format import one_line
 
 __all__ = ["format_run"]
 
@@ -21,6 +22,7 @@ def format_run(store: Store, row: RunRow) -> str:
         f"  status     {row.status}{': ' + row.reason if row.reason else ''}",
         f"  detector   {row.detector}  {json.dumps(row.parameters)}",
         f"  scene      {row.scene}, key {row.scene_key[:16]}",
+        *(f"  note       {one_line(str(note))}" for note in store.run_notes([row.id]).get(row.id, ())),
         f"  seed       {row.seed}",
         f"  code       roofbench {row.version}, {len(code.modules)} modules, digest {code.digest[:16]}",
         f"  packages   {', '.join(f'{name} {version}' for name, version in code.packages.items())}",

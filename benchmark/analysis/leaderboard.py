@@ -30,6 +30,8 @@ from .results import Cell, Entry, Leaderboard, UnsuccessfulRun
 __all__ = ["make_leaderboard", "repeat_command", "unsuccessful_runs"]
 
 _RESAMPLES = 1000  # of pooled indices, each of which is summarised anew
+#: Different notes of runs that are shown at most, and scenes that are named in one.
+_MOST_ESTIMATES, _MOST_SCENES = 5, 4
 
 
 def make_leaderboard(
@@ -88,6 +90,7 @@ def make_leaderboard(
         *group_note,
         *_notes(boards, scenes),
         *(f"{scene} has no reference and is left out" for scene in bare),
+        *_estimates(rows, store),
     ]
     return Leaderboard(
         title=title,
@@ -270,6 +273,21 @@ def _notes(boards: Sequence[_Tally], scenes: Sequence[str]) -> tuple[str, ...]:
     return tuple(
         f"{board.label} has no rank: it has a result on {board.scenes} of {len(scenes)} scenes" for board in short
     )
+
+
+def _estimates(rows: Sequence[RunRow], store: Store) -> Iterator[str]:
+    """Yield what was estimated for lack of data, such as a ground without a DEM, with the scenes concerned."""
+    scene_of = {row.id: row.scene for row in rows}
+    scenes: dict[str, dict[str, None]] = {}
+    for run, notes in sorted(store.run_notes(scene_of).items()):
+        for note in notes:
+            scenes.setdefault(note, {})[scene_of[run]] = None
+    for note, names in list(scenes.items())[:_MOST_ESTIMATES]:
+        some = list(names)[:_MOST_SCENES]
+        more = f" and {len(names) - len(some)} more" if len(names) > len(some) else ""
+        yield f"{', '.join(some)}{more}: {note}"
+    if len(scenes) > _MOST_ESTIMATES:
+        yield f"{len(scenes) - _MOST_ESTIMATES} further estimates; 'roofbench why RUN' shows those of a run"
 
 
 def unsuccessful_runs(rows: Iterable[RunRow]) -> tuple[UnsuccessfulRun, ...]:

@@ -269,6 +269,14 @@ class StoreReader:
         facts: Mapping[str, Any] = json.loads(row["metadata"])
         return facts
 
+    def run_notes(self, run_ids: Iterable[int]) -> dict[int, tuple[str, ...]]:
+        """Return what these runs estimated for lack of data, one sentence each; runs without notes are absent."""
+        wanted = set(run_ids)
+        query = """SELECT id, json_extract(metadata, '$.notes') AS notes FROM runs
+            WHERE metadata LIKE '%"notes"%' AND json_type(metadata, '$.notes') = 'array'"""
+        rows = self._db.execute(query)
+        return {int(row["id"]): tuple(json.loads(row["notes"])) for row in rows if row["id"] in wanted}
+
 
 def _chunks(items: list[str], size: int = 500) -> Iterator[list[str]]:
     for start in range(0, len(items), size):

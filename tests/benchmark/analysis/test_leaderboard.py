@@ -25,8 +25,8 @@ def squares(count, shift=0.0):
 class Memory:
     """What a leaderboard asks of a store."""
 
-    def __init__(self, evaluations, references):
-        self._evaluations, self._references = evaluations, references
+    def __init__(self, evaluations, references, notes):
+        self._evaluations, self._references, self._notes = evaluations, references, notes
 
     def evaluations(self, run_ids, evaluator, key):
         assert key == KEYED.key
@@ -39,12 +39,15 @@ class Memory:
     def reference_counts(self):
         return self._references
 
+    def run_notes(self, run_ids):
+        return {run_id: self._notes[run_id] for run_id in run_ids if run_id in self._notes}
+
 
 class Runs:
     """Rows and evaluations, run by run."""
 
     def __init__(self):
-        self.rows, self.evaluations, self.references = [], {}, {}
+        self.rows, self.evaluations, self.references, self.notes = [], {}, {}, {}
 
     def add(self, label, scene, found=None, *, of=10, shift=0.5, seed=0, status="ok", **costs):
         number = len(self.rows) + 1
@@ -70,7 +73,7 @@ class Runs:
         return self
 
     def board(self, **options):
-        memory = Memory(self.evaluations, self.references)
+        memory = Memory(self.evaluations, self.references, self.notes)
         return make_leaderboard(self.rows, memory, KEYED, title="t", **options)
 
 
@@ -210,3 +213,24 @@ def test_failures_are_listed_before_skips_with_the_command_that_repeats_them():
 def test_an_unknown_index_is_answered_with_the_nearest():
     with pytest.raises(UnknownNameError, match=r"did you mean 'pixel\.quality'"):
         Runs().add("d", 1, 8).board(rank_by="pixel.qualty")
+
+
+def test_a_note_of_several_runs_stands_once_with_its_scenes():
+    runs = Runs()
+    for scene in range(1, 7):
+        runs.add("one", scene, 9).add("two", scene, 8)
+        runs.notes |= {len(runs.rows) - 1: ("no DEM",), len(runs.rows): ("no DEM",)}
+    runs.notes[1] = ("no DEM", "no point")
+    assert runs.board().notes[-2:] == (
+        "hamlet-1, hamlet-2, hamlet-3, hamlet-4 and 2 more: no DEM",
+        "hamlet-1: no point",
+    )
+
+
+def test_many_different_notes_are_counted():
+    runs = Runs()
+    for scene in range(1, 9):
+        runs.add("one", scene, 9)
+        runs.notes[scene] = (f"the DEM shows {scene} % of the scene",)
+    assert runs.board().notes[-2] == "hamlet-5: the DEM shows 5 % of the scene"
+    assert runs.board().notes[-1] == "3 further estimates; 'roofbench why RUN' shows those of a run"

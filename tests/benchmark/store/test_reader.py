@@ -200,3 +200,12 @@ def test_nan_in_attributes_is_none(tmp_path):
     values = [plain_value(value) for value in (np.float32(0.5), np.int64(3), np.nan, None, "text", True)]
     assert values == [0.5, 3, None, None, "text", True]
     assert [type(value) for value in values[:2]] == [float, int]
+
+
+def test_notes_of_runs_and_no_others(store):
+    noted = Outcome(status="ok", cost=Cost(seconds=1.0, cpu_seconds=1.0, peak_memory=1), metadata={"notes": ["no DEM"]})
+    other = Outcome(status="ok", cost=Cost(seconds=1.0, cpu_seconds=1.0, peak_memory=1), metadata={"notes": "a text"})
+    first = store.record(identity("noted"), noted, version="1")
+    second = store.record(identity("other"), other, version="1")
+    assert store.run_notes([1, 2, 3, first, second]) == {first: ("no DEM",)}
+    assert store.run_notes([1]) == {}
