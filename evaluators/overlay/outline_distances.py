@@ -20,10 +20,9 @@ __all__ = ["PairDistances", "corner_distances", "pair_distances", "polis_distanc
 
 _CHUNK = 1 << 16
 
-#: From so many pairs of general outlines on, distances are computed by compiled code, which takes a moment to load.
-_MANY_OUTLINES = 10_000
-#: Most vertex pairs of two outlines for which all are compared; above, GEOS searches edges by an index.
-_MOST_VERTEX_PAIRS = 1 << 18
+#: From so many pairs of general outlines on, or of any, distances are computed by compiled code, which takes a moment
+#: to load.
+_MANY_OUTLINES, _MANY_PAIRS = 10_000, 50_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +48,16 @@ def pair_distances(
     detected: Footprints, reference: Footprints, pairs: tuple[NDArray[np.int64], NDArray[np.int64]]
 ) -> PairDistances:
     """Measure matched pairs, given as rows (detections, references)."""
-    corners = [footprints.quadrilaterals[1] for footprints in (detected, reference)]
     rows = [
         quadrilateral_rows(footprints)[members]
         for footprints, members in zip((detected, reference), pairs, strict=True)
     ]
     both = (rows[0] >= 0) & (rows[1] >= 0)
+    if len(both) > _MANY_PAIRS or np.count_nonzero(~both) > _MANY_OUTLINES:
+        from .vertex_distances import ring_distances  # compiled code: a comparison of small files does without
+
+        return PairDistances(*ring_distances(detected.rings, reference.rings, *pairs, both))
+    corners = [footprints.quadrilaterals[1] for footprints in (detected, reference)]
     polis = np.empty(len(pairs[0]))
     outline = np.empty(len(pairs[0]))
     for start in range(0, len(both), _CHUNK):
@@ -64,28 +67,11 @@ def pair_distances(
         outline[quick] = corner_distances(one, two)
         polis[quick] = (_vertices_to_edges(one, two) + _vertices_to_edges(two, one)) / 2
     general = np.flatnonzero(~both)
-    polis[general] = _polis(detected, reference, pairs[0][general], pairs[1][general])
+    for start in range(0, len(general), _CHUNK):
+        few = general[start : start + _CHUNK]
+        polis[few] = polis_distances(detected.polygons[pairs[0][few]], reference.polygons[pairs[1][few]])
     outline[general] = polis[general]
     return PairDistances(outline, both, polis)
-
-
-def _polis(
-    detected: Footprints, reference: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return PoLiS of pairs of general outlines."""
-    many = np.zeros(len(first), dtype=bool)
-    if len(first) > _MANY_OUTLINES:
-        many = np.diff(detected.rings[0])[first] * np.diff(reference.rings[0])[second] <= _MOST_VERTEX_PAIRS
-    distances = np.empty(len(first))
-    if many.any():
-        from .vertex_distances import vertex_distances  # compiled code: a comparison of small files does without
-
-        distances[many] = vertex_distances(detected, reference, first[many], second[many])
-    rest = np.flatnonzero(~many)
-    for start in range(0, len(rest), _CHUNK):
-        rows = rest[start : start + _CHUNK]
-        distances[rows] = polis_distances(detected.polygons[first[rows]], reference.polygons[second[rows]])
-    return distances
 
 
 def corner_distances(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -32,7 +32,8 @@ def count_objects(graph: OverlapGraph) -> Counts:
     overlapping = np.union1d(one[~natural], two[~natural])
 
     buildings = int(building.max()) + 1 if len(building) else 1
-    touched = np.unique(overlaps.first * buildings + building[overlaps.second]) // buildings
+    touched = np.sort(overlaps.first * buildings + building[overlaps.second])
+    touched = touched[np.diff(touched, prepend=-1) > 0] // buildings
     cross_lapping = (np.bincount(touched, minlength=len(graph.detected)) > 1).sum()
 
     other = partner[overlaps.first]
@@ -57,12 +58,12 @@ def count_buildings(graph: OverlapGraph) -> Buildings:
     """Return how many reference buildings there are, and how many have all or any of their parts found."""
     counted = graph.references.mask
     found = graph.correspondence.of_reference >= 0
-    _, part_building = np.unique(graph.reference.building_codes[counted], return_inverse=True)
+    part_building = graph.reference.building_codes[counted]
     parts = np.bincount(part_building)
-    found_parts = np.bincount(part_building, weights=found[counted], minlength=len(parts))
+    found_parts = np.bincount(part_building[found[counted]], minlength=len(parts))
     return Buildings(
-        reference=len(parts),
-        complete_all=int((found_parts == parts).sum()),
+        reference=int((parts > 0).sum()),
+        complete_all=int(((parts > 0) & (found_parts == parts)).sum()),
         complete_any=int((found_parts > 0).sum()),
     )
 

@@ -233,16 +233,11 @@ class Footprints:
     @cached_property
     def quadrilaterals(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Indices (m,) and corners (m, 4, 2), counter-clockwise, of the convex quadrilaterals without holes."""
-        candidates = np.flatnonzero(
-            (shapely.get_type_id(self.polygons) == 3)
-            & (shapely.get_num_coordinates(self.polygons) == 5)
-            & (shapely.get_num_interior_rings(self.polygons) == 0)
-        )
-        corners = shapely.get_coordinates(self.polygons[candidates]).reshape(-1, 5, 2)[:, :4]
-        edges = np.roll(corners, -1, axis=1) - corners
-        following = np.roll(edges, -1, axis=1)
-        turns = edges[..., 0] * following[..., 1] - edges[..., 1] * following[..., 0]
-        left, right = (turns > 0).all(axis=1), (turns < 0).all(axis=1)
+        start, points = self.rings
+        candidates = np.flatnonzero(np.diff(start) == 5)  # a closed ring; two rings take nine rows
+        corners = points[start[candidates][:, None] + np.arange(4)]
+        turns = _turns(corners)
+        left, right = np.asarray((turns > 0).all(axis=1)), np.asarray((turns < 0).all(axis=1))
         corners = np.where(right[:, None, None], corners[:, ::-1], corners)
         convex = left | right
         return candidates[convex], np.ascontiguousarray(corners[convex])
@@ -256,6 +251,9 @@ class Footprints:
         """
         single = (shapely.get_type_id(self.polygons) == 3) & (shapely.get_num_interior_rings(self.polygons) == 0)
         counts = shapely.get_num_coordinates(self.polygons).astype(np.int64)
+        if single.all():
+            start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+            return start, shapely.get_coordinates(self.polygons)
         several: dict[int, NDArray[np.float64]] = {}
         gap = np.full((1, 2), np.nan)
         for row in np.flatnonzero(~single).tolist():
@@ -287,6 +285,14 @@ class Footprints:
             along /= first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
             centres[index] = corners[:, 0] + along[:, None] * first
         return centres
+
+
+def _turns(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the cross product of the two edges at each corner of quadrilaterals (n, 4, 2), shape (n, 4)."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    following = np.roll(edges, -1, axis=1)
+    turns: NDArray[np.float64] = edges[..., 0] * following[..., 1] - edges[..., 1] * following[..., 0]
+    return turns
 
 
 def _centroids(start: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -377,12 +383,29 @@ def _mend(
 
 
 def _are_valid(geometries: NDArray[np.object_]) -> NDArray[np.bool_]:
-    """Return which geometries are valid; many of them are tested by several threads."""
+    """Return which polygons are valid; many of them are tested by several threads.
+
+    Quadrilaterals that are clearly convex, as most footprints are, need no test by GEOS.
+    """
     if len(geometries) <= _CHUNK:
         return np.asarray(shapely.is_valid(geometries))
+    valid = np.zeros(len(geometries), dtype=bool)
+    quadrilaterals = np.flatnonzero(
+        (shapely.get_type_id(geometries) == 3)
+        & (shapely.get_num_coordinates(geometries) == 5)
+        & (shapely.get_num_interior_rings(geometries) == 0)
+    )
+    corners = shapely.get_coordinates(geometries[quadrilaterals]).reshape(-1, 5, 2)[:, :4]
+    turns = _turns(corners)
+    # Rounding of coordinates and products moves a turn by less than this.
+    size = np.abs(corners).max(axis=(1, 2)) * np.ptp(corners, axis=1).max(axis=1)
+    clear = np.abs(turns).min(axis=1) > 1e-12 * size
+    valid[quadrilaterals] = clear & ((turns > 0).all(axis=1) | (turns < 0).all(axis=1))
+    rest = np.flatnonzero(~valid)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        parts = pool.map(shapely.is_valid, np.array_split(geometries, len(geometries) // _CHUNK + 1))
-        return np.concatenate(list(parts))
+        parts = pool.map(shapely.is_valid, np.array_split(geometries[rest], len(rest) // _CHUNK + 1))
+        valid[rest] = np.concatenate(list(parts))
+    return valid
 
 
 def polygonal_part(geometry: shapely.Geometry, *, grid_size: float | None = None) -> shapely.Geometry:
