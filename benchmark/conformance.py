@@ -14,12 +14,13 @@ import shapely
 
 from ..core.errors import RoofbenchError, UnsupportedError
 from ..core.parameters import Parameterised
+from ..core.processes import Limits
 from ..detectors.base import Detector
 from ..evaluators.base import Evaluation, Evaluator
 from ..scenes.builtin import hamlet
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
-from .execution.isolation import IsolatedProcess, Limits
+from .execution.isolation import IsolatedProcess
 from .execution.tasks import Task
 from .execution.worker import detect
 from .identity.recipes import PluginRecipe, SceneRecipe

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
-from ..core.errors import RoofbenchError, UnsupportedError
+from ..core.errors import ParameterError, RoofbenchError, UnsupportedError
 from ..detectors.base import Detector
 from ..evaluators.base import Evaluator
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import INPUTS, Scene
 from .identity.keys import source_closure
-from .identity.recipes import PluginRecipe, SceneRecipe, code_digest, label_of
+from .identity.recipes import PluginRecipe, SceneRecipe, code_digest, fingerprint_on, label_of
 from .store.records import RunIdentity, RunRow, evaluation_key
 from .store.writer import Store
 from .suite import DetectorEntry, Suite
@@ -146,14 +147,14 @@ def make_plan(suite: Suite, store: Store, *, rerun: Rerun = "missing", only_fail
     """
     evaluators = tuple(KeyedEvaluator.of(evaluator) for evaluator in suite.evaluators)
     identities: list[tuple[RunIdentity, DetectorEntry, SceneRecipe | Scene]] = []
-    parts = [
-        (entry, _recipe(entry.detector), source_closure(type(entry.detector)), entry.detector.fingerprint())
-        for entry in suite.detectors
-    ]
+    parts = [(entry, _recipe(entry.detector), source_closure(type(entry.detector))) for entry in suite.detectors]
+    _require_own_labels([(entry.label, detector) for entry, detector, _ in parts])
+    read = lru_cache(maxsize=None)(fingerprint_on)
     for scene in suite.scenes:
         recipe = scene_recipe(scene)
         key = recipe.key
-        for entry, detector, code, fingerprint in parts:
+        for entry, detector, code in parts:
+            fingerprint = read(entry.detector, recipe.name)
             for seed in entry.seeds:
                 identity = RunIdentity(
                     detector=detector,
@@ -222,6 +223,14 @@ def _warnings(suite: Suite) -> Iterator[str]:
             yield f"{label_of(evaluator)} cannot evaluate on {shown} (no orthoimage): {error}"
 
 
+def _require_own_labels(entries: Sequence[tuple[str, PluginRecipe]]) -> None:
+    """Raise `ParameterError` when tables could not tell two detectors of a suite apart."""
+    known: dict[str, PluginRecipe] = {}
+    for label, recipe in entries:
+        if known.setdefault(label, recipe) != recipe:
+            raise ParameterError(f"two detectors are called {label!r} in tables: give each its own label")
+
+
 def _foreseen_skip(scene: SceneRecipe | Scene, requires: tuple[str, ...]) -> str:
     """Return which input a scene lacks, without reading or generating it; empty where that cannot be known."""
     contents = scene.contents
@@ -279,7 +288,7 @@ def identity_now(row: RunRow) -> RunIdentity:
     return RunIdentity(
         detector=PluginRecipe(row.detector, detector.values()),
         label=row.label,
-        fingerprint=detector.fingerprint(),
+        fingerprint=fingerprint_on(detector, row.recipe.name),
         code=source_closure(type(detector)),
         scene=row.recipe,
         scene_key=row.recipe.key,

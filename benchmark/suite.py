@@ -26,6 +26,7 @@ from ..core.errors import InputError, ParameterError, RoofbenchError, UnknownNam
 from ..core.inputs import require_file
 from ..core.registry import nearest_hint, parse_selection
 from ..detectors.base import Detector
+from ..detectors.external.external_paths import with_absolute_paths
 from ..detectors.registry import DETECTORS, make_detector
 from ..evaluators.base import Evaluator
 from ..evaluators.registry import make_evaluator
@@ -345,6 +346,8 @@ def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number
 def _detector_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number: int) -> DetectorEntry:
     use, values = _use(entry, folder, places, "detectors", number)
     seeds = values.pop("seeds", [0])
+    if use in ("command", "precomputed"):
+        values = with_absolute_paths(values, folder)
     try:
         detector = make_detector(use, values)
     except RoofbenchError as error:

@@ -160,8 +160,8 @@ class RunOptions:
 
     def execution(self) -> Execution:
         """Return how runs are executed."""
-        from ..benchmark.execution.isolation import Limits
         from ..benchmark.execution.runner import Execution
+        from ..core.processes import Limits
 
         if self.jobs == 0 and (self.time_limit is not None or self.memory_limit is not None):
             raise ParameterError("limits need a worker process: set jobs=1 or more")

@@ -101,8 +101,8 @@ def _write_steps(detector: Detector, scene: Scene, seed: int, folder: Path, over
     from ..benchmark.execution.worker import random_stream
     from ..reports.steps.step_folder import write_steps
 
+    scene.require(detector.requires)
     visible = scene.for_detection()
-    visible.require(detector.requires)
     with _failures_reported(detector, scene):
         steps = detector.steps(visible, random_stream(seed, scene, detector))
         return write_steps(steps, folder, title=f"{detector.name} on {scene.name}", overwrite=overwrite)

@@ -9,7 +9,8 @@
         ├── ParameterError        a parameter outside its range, or an unknown one       (also ValueError)
         ├── UnknownNameError      no detector, evaluator, preset or suite of that name   (also LookupError)
         ├── OutputError           a result that cannot be written                        (also OSError)
-        ├── MissingInputError     a scene lacks what a detector requires: the run is skipped, not failed
+        ├── MissingInputError     a scene or a machine lacks what a detector requires: the run is skipped, not failed
+        ├── ProgramError          an external program that failed or exceeded a limit
         └── UnsupportedError      the operation is not offered by this detector or evaluator
 
 Each message is one sentence that says what is wrong, where, which rule it breaks and what to do. The command line
@@ -22,6 +23,7 @@ __all__ = [
     "MissingInputError",
     "OutputError",
     "ParameterError",
+    "ProgramError",
     "RoofbenchError",
     "UnknownNameError",
     "UnsupportedError",
@@ -53,7 +55,25 @@ class OutputError(RoofbenchError, OSError):
 
 
 class MissingInputError(RoofbenchError):
-    """A scene lacks an input that a detector requires."""
+    """A scene lacks an input, or this machine a program, that a detector requires."""
+
+
+class ProgramError(RoofbenchError):
+    """An external program that failed, exceeded a limit, or wrote what cannot be used.
+
+    Parameters
+    ----------
+    message : str
+        One sentence.
+    log : str, optional
+        End of what the program printed; tracebacks show it.
+    """
+
+    def __init__(self, message: str, *, log: str = "") -> None:
+        super().__init__(message)
+        self.log = log
+        if log:
+            self.add_note(log)
 
 
 class UnsupportedError(RoofbenchError):

@@ -25,6 +25,8 @@ from .package import NAME
 __all__ = ["Registry", "nearest_hint", "parse_assignment", "parse_selection", "split_list"]
 
 _SELECTION = re.compile(r"^(?P<name>[^\[\]]+?)(?:\[(?P<parameters>.*)\])?$", re.DOTALL)
+#: Commas that are followed by an even number of double quotes.
+_OUTSIDE_QUOTES = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')
 
 
 def nearest_hint(name: str, known: Iterable[str]) -> str:
@@ -55,13 +57,13 @@ def parse_selection(text: str) -> tuple[str, dict[str, str]]:
     if match is None:
         raise ParameterError(f"cannot read the selection {text!r}: write name or name[parameter=value,...]")
     values: dict[str, str] = {}
-    for item in (match["parameters"] or "").split(","):
+    for item in _OUTSIDE_QUOTES.split(match["parameters"] or ""):
         if item.strip():
             try:
                 key, value = parse_assignment(item)
             except ParameterError:
                 raise ParameterError(f"cannot read {item.strip()!r} in {text!r}: write parameter=value") from None
-            values[key] = value
+            values[key] = value[1:-1] if len(value) > 1 and value[0] == value[-1] == '"' else value
     return match["name"].strip(), values
 
 

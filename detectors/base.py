@@ -69,6 +69,10 @@ class Detector(Parameterised, ABC):
         """
         return ""
 
+    def own_label(self) -> str:
+        """Return its name in tables where it is not the name with changed parameters; empty for most."""
+        return ""
+
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
         """Yield the intermediate results of the same detection as data (`detectors.steps`); nothing is drawn here.
 

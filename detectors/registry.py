@@ -15,9 +15,11 @@ DETECTORS = Registry(
     "roofbench.detectors",
     Detector,
     {
+        "command": "detectors.external.command_detector:Command",
         "improved": "detectors.lines.improved:Improved",
         "ndsm": "detectors.ndsm.ndsm_detector:NDSM",
         "original": "detectors.lines.original:Original",
+        "precomputed": "detectors.external.precomputed:Precomputed",
         "mpp": "detectors.mpp.mpp_detector:MPP",
         "mpp-printed": "detectors.mpp.printed_detector:MPPPrinted",
     },

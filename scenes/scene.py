@@ -23,7 +23,10 @@ from .geodata.raster import Elevation, Grid, Image
 if TYPE_CHECKING:
     from .ground.heights import Heights
 
-__all__ = ["INPUTS", "LayerFiles", "Layers", "Scene"]
+__all__ = ["INPUTS", "NEUTRAL_NAME", "LayerFiles", "Layers", "Scene"]
+
+#: The name of every scene that a detector sees: a real one would lead to the seed, and so to the reference.
+NEUTRAL_NAME = "scene"
 
 #: What a detector may require, and how it is named to people.
 INPUTS: Mapping[str, str] = {
@@ -265,26 +268,21 @@ class Scene:
         return hashlib.sha256(repr((extent, self.crs, files)).encode()).hexdigest()
 
     def for_detection(self) -> Scene:
-        """Return the scene as a detector may see it: no reference, no area, no classification, no generator facts.
+        """Return the scene as a detector may see it: measurements under a neutral name, and nothing else.
 
-        Such a scene returns itself.
+        It has no reference, area, classification or facts, and holds no object, function or path that leads to them:
+        the layers are read here. Such a scene returns itself.
         """
         if self._is_for_detection:
             return self
-
-        def points() -> PointCloud | None:
-            cloud = self.points
-            return None if cloud is None else cloud.unclassified()
-
-        held = self._sources
+        cloud = self.points
         seen = Scene(
-            self.name,
+            NEUTRAL_NAME,
             self.extent,
             crs=self.crs,
-            points=points if held["points"] is not None else None,
-            image=(lambda: self.image) if held["image"] is not None else None,
-            dem=(lambda: self.dem) if held["dem"] is not None else None,
-            content_hash=lambda: self.content_hash,
+            points=None if cloud is None else cloud.unclassified(),
+            image=self.image,
+            dem=self.dem,
         )
         seen.ground_cell = self.ground_cell
         seen._is_for_detection = True

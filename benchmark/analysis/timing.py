@@ -24,8 +24,9 @@ from pathlib import Path
 
 from ...core.errors import UnsupportedError
 from ...core.package import FOLDER, NAME
+from ...core.processes import Limits
 from ...evaluators.base import Index
-from ..execution.isolation import IsolatedProcess, Limits
+from ..execution.isolation import IsolatedProcess
 from ..execution.tasks import Task
 from ..identity.recipes import PluginRecipe
 from ..store.outcomes import Outcome

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import queue
 import selectors
-import signal
 import struct
 import subprocess
 import sys
@@ -19,51 +18,28 @@ import tempfile
 import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import IO
 
+from ...core.memory import bound_allocations, highest_memory, tree_memory
+from ...core.processes import (
+    Limits,
+    clean_environment,
+    death_reason,
+    end_children,
+    end_tree,
+    memory_reason,
+    time_reason,
+)
 from ..store.outcomes import Cost, Outcome, ScoreFailure
-from .memory import bound_allocations, highest_memory
 from .tasks import Task
 
-__all__ = [
-    "THREAD_LIMITS",
-    "IsolatedProcess",
-    "Limits",
-    "call_isolated",
-    "close_isolated",
-    "serve",
-]
+__all__ = ["IsolatedProcess", "call_isolated", "close_isolated", "serve"]
 
-#: One thread per numeric library and process.
-THREAD_LIMITS = {
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "NUMBA_NUM_THREADS": "1",
-    "NUMEXPR_NUM_THREADS": "1",
-    "VECLIB_MAXIMUM_THREADS": "1",
-}
 _PACKAGE = __package__
 _START = f"from {_PACKAGE}.isolation import serve; serve()"
 _WATCH_EVERY = 0.05  # seconds between two checks of a worker with a memory limit
 _LOOK_EVERY = 0.5  # seconds between two checks of any other worker
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits of one run.
-
-    Attributes
-    ----------
-    seconds : float, optional
-        Wall clock time, including reading of the scene, evaluation, and the start of a new worker.
-    memory : int, optional
-        Highest resident memory of the worker process, bytes.
-    """
-
-    seconds: float | None = None
-    memory: int | None = None
 
 
 class IsolatedProcess:
@@ -73,6 +49,7 @@ class IsolatedProcess:
         self._python_path = python_path
         self._process: subprocess.Popen[bytes] | None = None
         self._errors: IO[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._detected: bytes | None = None
 
     def call(self, task: str, limits: Limits) -> bytes:
@@ -93,16 +70,14 @@ class IsolatedProcess:
             receiver = _Receiver(process.stdout)
             while (message := receiver.poll(_pause(limits, deadline))) is None:
                 self._detected = receiver.preliminary
-                peak = highest_memory(process.pid)
+                peak = highest_memory(process.pid) if limits.memory is None else tree_memory(process.pid)
                 if deadline is not None and time.monotonic() > deadline:
-                    return self._failed(
-                        process, task, f"time limit of {limits.seconds:g} s exceeded", started=started, peak=peak
-                    )
+                    return self._failed(process, task, time_reason(limits.seconds or 0.0), started=started, peak=peak)
                 if limits.memory is not None and peak > limits.memory:
-                    return self._failed(process, task, _too_much(peak, limits.memory), started=started, peak=peak)
+                    return self._failed(process, task, memory_reason(peak, limits.memory), started=started, peak=peak)
             peak = highest_memory(process.pid)
             if limits.memory is not None and peak > limits.memory:  # a peak between two checks
-                return self._failed(process, task, _too_much(peak, limits.memory), started=started, peak=peak)
+                return self._failed(process, task, memory_reason(peak, limits.memory), started=started, peak=peak)
             return message
         except (EOFError, OSError, ValueError):  # ValueError: the stream was closed
             return self._failed(process, task, None, started=started, peak=peak)
@@ -111,9 +86,12 @@ class IsolatedProcess:
         """End the process."""
         process, self._process = self._process, None
         if process is not None:
+            end_tree(process.pid)
             with suppress(OSError):
                 process.kill()
             process.wait()
+            if self._folder is not None:
+                self._folder.cleanup()
             for stream in (process.stdin, process.stdout, self._errors):
                 if stream is not None:
                     with suppress(OSError):
@@ -125,7 +103,7 @@ class IsolatedProcess:
         if reason is None:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(timeout=5)
-            reason = _death(process.returncode)
+            reason = death_reason(process.returncode, "the worker process")
         written = ""
         if self._errors is not None:
             with suppress(OSError, ValueError):  # closed when the caller was interrupted
@@ -143,8 +121,8 @@ class IsolatedProcess:
         if self._process is None:
             path = self._python_path
             if path is None:
-                path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-            environment = {**os.environ, **THREAD_LIMITS, "PYTHONPATH": path}
+                path = os.pathsep.join(entry for entry in sys.path if entry)
+            self._folder = tempfile.TemporaryDirectory(prefix="roofbench-")
             self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
                 # -P: the working directory must not come before the given path, which may hold older code.
@@ -152,7 +130,9 @@ class IsolatedProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
-                env=environment,
+                env=clean_environment({"PYTHONPATH": path}),
+                # The folder of the caller holds stores and suites, which are nothing for a detector.
+                cwd=self._folder.name,
                 start_new_session=True,  # Ctrl-C reaches the caller only, which ends its workers
             )
         return self._process
@@ -173,20 +153,6 @@ def _pause(limits: Limits, deadline: float | None) -> float:
     """Return how long to wait for an answer until the next check, seconds."""
     pause = _LOOK_EVERY if limits.memory is None else _WATCH_EVERY
     return pause if deadline is None else max(0.0, min(pause, deadline - time.monotonic()))
-
-
-def _too_much(peak: int, limit: int) -> str:
-    return f"memory limit of {limit / 1e6:.0f} MB exceeded: {peak / 1e6:.0f} MB used"
-
-
-def _death(code: int | None) -> str:
-    if code is None:
-        return "the worker process stopped answering"
-    if code < 0:
-        with suppress(ValueError):
-            return f"the worker process was killed by signal {-code} ({signal.Signals(-code).name})"
-        return f"the worker process was killed by signal {-code}"
-    return f"the worker process exited with code {code}"
 
 
 _local = threading.local()
@@ -219,6 +185,7 @@ def serve() -> None:
             try:
                 tasks.put(_receive(inward))
             except (EOFError, OSError):
+                end_children()
                 os._exit(0)  # the caller has ended, so nobody needs the result
 
     threading.Thread(target=listen, daemon=True).start()

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...core.errors import UnsupportedError
+from ...core.processes import Limits
 from ...scenes.scene import Scene
 from ..identity.provenance import code_version
 from ..identity.recipes import PluginRecipe, SceneRecipe
@@ -20,7 +21,7 @@ from ..store.records import RunRow
 from ..store.writer import Store
 from .dispatch import Dispatcher
 from .executors import InProcess, Slot, cluster_slot, local_slots
-from .isolation import Limits, call_isolated
+from .isolation import call_isolated
 from .tasks import Task
 from .worker import execute, score
 

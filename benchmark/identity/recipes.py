@@ -17,6 +17,7 @@ from ...core.errors import ParameterError, UnknownNameError, UnsupportedError
 from ...core.parameters import parameter_text
 from ...core.registry import Registry, nearest_hint
 from ...detectors.base import Detector
+from ...detectors.external.precomputed import Precomputed
 from ...detectors.registry import DETECTORS, make_detector
 from ...evaluators.base import Evaluator
 from ...evaluators.registry import EVALUATORS, make_evaluator
@@ -30,7 +31,7 @@ from ...scenes.synthetic.presets import preset_names as generator_presets
 from .keys import digest, module_closure, source_closure
 from .spool import read_spooled
 
-__all__ = ["PluginRecipe", "SceneRecipe", "code_digest", "label_of", "preset_names"]
+__all__ = ["PluginRecipe", "SceneRecipe", "code_digest", "fingerprint_on", "label_of", "preset_names"]
 
 _HAMLET = "hamlet"
 _GENERATOR = "scenes.synthetic"
@@ -38,7 +39,10 @@ _BUILTIN = "scenes.builtin"
 
 
 def label_of(plugin: Detector | Evaluator) -> str:
-    """Return the name with what differs from the defaults: ``ndsm[cell=0.25]``."""
+    """Return the name with what differs from the defaults: ``ndsm[cell=0.25]``, or with the plugin's own label."""
+    own = plugin.own_label() if isinstance(plugin, Detector) else ""
+    if own:
+        return f"{plugin.name}:{own}"
     changed = ",".join(f"{name}={parameter_text(value)}" for name, value in plugin.changed().items())
     return f"{plugin.name}[{changed}]" if changed else plugin.name
 
@@ -262,6 +266,11 @@ def _checked_parameters(name: str, parameters: Mapping[str, Any]) -> dict[str, A
 def preset_names() -> list[str]:
     """Return the names of the scenes that can be generated, the built-in one included."""
     return [_HAMLET, *generator_presets()]
+
+
+def fingerprint_on(detector: Detector, scene: str) -> str:
+    """Return the digest of what a detector reads besides a scene, which is known by its real name."""
+    return detector.fingerprint_on(scene) if type(detector) is Precomputed else detector.fingerprint()
 
 
 def code_digest(plugin: Detector | Evaluator) -> str:

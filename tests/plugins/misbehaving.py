@@ -9,30 +9,32 @@ from dataclasses import dataclass
 import numpy as np
 
 import roofbench as rb
+from roofbench.scenes.builtin import hamlet
 
 
 @dataclass(frozen=True, kw_only=True)
 class Misbehaving(rb.Detector):
-    """Squares of a given side around the centres of a lattice; misbehaves on scenes of a chosen name."""
+    """Squares of a given side around the centres of a lattice; misbehaves on a chosen scene."""
 
     name = "misbehaving"
     requires = ("points",)
     stochastic = True
 
     mode: str = rb.parameter("good", doc="what it does")
-    only_on: str = rb.parameter("", doc="text in the scene's name where it does so; elsewhere it is good")
+    only_on: str = rb.parameter("", doc="built-in scene where it does so, by its name; elsewhere it is good")
     side: float = rb.parameter(8.0, unit="m", minimum=0.1, doc="side of the squares")
     seconds: float = rb.parameter(0.0, unit="s", minimum=0, doc="time that it takes")
 
     def detect(self, scene, rng):
-        if self.only_on in scene.name:
+        here = not self.only_on or hamlet(int(self.only_on.removeprefix("hamlet-"))).points.x[0] == scene.points.x[0]
+        if here:
             getattr(self, f"_{self.mode}")(scene)
             if self.mode == "nonsense":
                 return "nonsense"
         time.sleep(self.seconds or float(os.environ.get("MISBEHAVING_SECONDS", "0")))
         x, y = np.meshgrid(np.arange(12, 120, 24.0), np.arange(12, 120, 24.0))
         centres = np.stack([x.ravel(), y.ravel()], -1) + scene.extent[:2] + rng.normal(0, 0.5, (25, 2))
-        if self.only_on in scene.name and self.mode == "far":
+        if here and self.mode == "far":
             centres = centres + 1e6
         corners = centres[:, None] + np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * self.side / 2
         return rb.Footprints.from_rectangles(corners)

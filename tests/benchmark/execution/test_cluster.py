@@ -10,13 +10,14 @@ from dataclasses import replace
 
 import pytest
 
-from roofbench.benchmark.execution.isolation import Limits, close_isolated
+from roofbench.benchmark.execution.isolation import close_isolated
 from roofbench.benchmark.execution.runner import Execution, run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store
 from roofbench.benchmark.suite import DetectorEntry, Suite
 from roofbench.core.errors import InputError
+from roofbench.core.processes import Limits
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 

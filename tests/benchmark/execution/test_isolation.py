@@ -6,8 +6,9 @@ import time
 
 import pytest
 
-from roofbench.benchmark.execution.isolation import IsolatedProcess, Limits
+from roofbench.benchmark.execution.isolation import IsolatedProcess
 from roofbench.benchmark.store.outcomes import Outcome
+from roofbench.core.processes import Limits
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,8 @@ def test_numeric_libraries_get_one_thread_each(process, task_of):
 
 def test_a_worker_leaves_when_its_caller_is_killed(task_of):
     code = (
-        "from roofbench.benchmark.execution.isolation import *; import sys; p = IsolatedProcess(); p._running();"
+        "from roofbench.benchmark.execution.isolation import *; from roofbench.core.processes import Limits;"
+        "import sys; p = IsolatedProcess(); p._running();"
         "print(p._process.pid, flush=True); p.call(sys.argv[1], Limits())"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import roofbench as rb
-from roofbench.benchmark.execution.isolation import Limits
 from roofbench.benchmark.execution.runner import Execution, run_plan
 from roofbench.benchmark.identity import keys
 from roofbench.benchmark.identity.keys import source_closure
@@ -13,6 +12,7 @@ from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.plan import make_plan, plan_content, suite_from_content
 from roofbench.benchmark.store.writer import Store
 from roofbench.benchmark.suite import DetectorEntry, Suite
+from roofbench.core.processes import Limits
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 from roofbench.scenes.builtin import hamlet

@@ -1,0 +1,104 @@
+"""Child processes: their limits, their environment, how they are ended, and the sentences that say how they ended."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+
+__all__ = [
+    "THREAD_LIMITS",
+    "Limits",
+    "clean_environment",
+    "death_reason",
+    "end_children",
+    "end_tree",
+    "memory_reason",
+    "time_reason",
+]
+
+#: One thread per numeric library and process.
+THREAD_LIMITS = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
+    "NUMEXPR_NUM_THREADS": "1",
+    "VECLIB_MAXIMUM_THREADS": "1",
+}
+#: Variables that say where and by which command line this process was started.
+_TRACES = ("PWD", "OLDPWD", "_", "PYTEST_CURRENT_TEST")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of one run or one program.
+
+    Attributes
+    ----------
+    seconds : float, optional
+        Wall clock time, including everything that is done for the run: reading, starting a process, evaluation.
+    memory : int, optional
+        Highest resident memory of the process and its children, bytes.
+    """
+
+    seconds: float | None = None
+    memory: int | None = None
+
+
+def clean_environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return the environment for a child process: without the folder and the command line of this process."""
+    kept = {name: value for name, value in os.environ.items() if name not in _TRACES}
+    return {**kept, **THREAD_LIMITS, **(more or {})}
+
+
+def end_tree(process: int) -> None:
+    """Kill a process with everything that it started and that is still its descendant."""
+    import psutil
+
+    with suppress(psutil.Error):
+        doomed = psutil.Process(process)
+        _kill([*doomed.children(recursive=True), doomed])
+
+
+def end_children() -> None:
+    """Kill every descendant of this process."""
+    import psutil
+
+    with suppress(psutil.Error):
+        _kill(psutil.Process().children(recursive=True))
+
+
+def _kill(processes: list[object]) -> None:
+    import psutil
+
+    for process in processes:
+        with suppress(psutil.Error):
+            process.kill()  # type: ignore[attr-defined]
+
+
+def time_reason(seconds: float) -> str:
+    """Return the sentence for an exceeded time limit."""
+    return f"time limit of {seconds:g} s exceeded"
+
+
+def memory_reason(peak: int, limit: int) -> str:
+    """Return the sentence for an exceeded memory limit, both in bytes."""
+    return f"memory limit of {limit / 1e6:.0f} MB exceeded: {peak / 1e6:.0f} MB used"
+
+
+def death_reason(code: int | None, who: str) -> str:
+    """Return how a process ended that should not have: `who` is its name in the sentence.
+
+    >>> death_reason(-9, "the program"), death_reason(3, "the program")
+    ('the program was killed by signal 9 (SIGKILL)', 'the program exited with code 3')
+    """
+    if code is None:
+        return f"{who} stopped answering"
+    if code < 0:
+        with suppress(ValueError):
+            return f"{who} was killed by signal {-code} ({signal.Signals(-code).name})"
+        return f"{who} was killed by signal {-code}"
+    return f"{who} exited with code {code}"

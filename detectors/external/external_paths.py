@@ -1,0 +1,82 @@
+"""Paths in the parameters of `command` and `precomputed`, and the content of the files that they name.
+
+A run may happen in another working folder, so paths are made absolute where the user gave them: on the command line
+from the current folder, in a suite from the folder of its file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shlex
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from ...core.errors import InputError, ParameterError
+
+__all__ = ["absolute_words", "content_digest", "split_words", "with_absolute_paths"]
+
+
+def split_words(text: str, parameter: str) -> list[str]:
+    """Split a text at spaces as a shell does, quotes included; nothing is expanded.
+
+    Raises
+    ------
+    ParameterError
+        A quote without its end.
+    """
+    try:
+        return shlex.split(text)
+    except ValueError as error:
+        raise ParameterError(f"{parameter} cannot be split into words: {error}: {text!r}") from error
+
+
+def absolute_words(text: str, parameter: str, folder: Path) -> str:
+    """Return a text of words in which those that name a file or folder are absolute paths."""
+    words = split_words(text, parameter)
+    return shlex.join(os.path.abspath(folder / word) if word and (folder / word).exists() else word for word in words)
+
+
+def with_absolute_paths(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return parameters of `command` or `precomputed` whose paths are relative to a folder, with absolute paths."""
+    changed = dict(values)
+    for name in ("run", "files"):
+        if isinstance(values.get(name), str):
+            changed[name] = absolute_words(values[name], name, folder)
+    if isinstance(values.get("folder"), str) and values["folder"]:
+        changed["folder"] = os.path.abspath(folder / values["folder"])
+    return changed
+
+
+def content_digest(paths: Iterable[Path]) -> str:
+    """Return the SHA-256 of the content of files, and of all files below folders with their relative names."""
+    digest = hashlib.sha256()
+    for path in paths:
+        for name, file in _files_of(path):
+            digest.update(f"{name} {_file_digest(file)}\n".encode())
+    return digest.hexdigest()
+
+
+def _files_of(path: Path) -> Iterator[tuple[str, Path]]:
+    if path.is_dir():
+        for file in sorted(path.rglob("*")):
+            if file.is_file() and file.parent.name != "__pycache__":
+                yield file.relative_to(path).as_posix(), file
+    else:
+        yield path.name, path
+
+
+def _file_digest(file: Path) -> str:
+    try:
+        facts = file.stat()
+        return _digest_at(str(file), facts.st_mtime_ns, facts.st_size)
+    except OSError as error:
+        raise InputError(f"{file} cannot be read: {error.strerror}") from error
+
+
+@lru_cache(maxsize=512)
+def _digest_at(file: str, modified: int, size: int) -> str:
+    with open(file, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
