@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..core.errors import ParameterError, RoofbenchError
+from ..core.errors import ParameterError, ProgramError, RoofbenchError
 from . import completion
 from .command import load_plugins
 from .options import OverwriteOption, ParameterOption, PluginOption, QuietOption
@@ -58,9 +58,8 @@ def detect(
 
     Exit code 3 when the detector fails; the end of its traceback is shown.
     """
-    import time
-
     from ..benchmark.execution.worker import detect as run_detector
+    from ..benchmark.execution.worker import processor_time
     from ..benchmark.suite import scenes_of
     from ..core.output import check_target
     from ..detectors.registry import make_detector
@@ -82,10 +81,10 @@ def detect(
     if Path(scene).exists():
         _ = place.content_hash  # tells a file that was edited or replaced since the scene was made
     if output is not None:
-        started = time.process_time()
+        started = processor_time()
         with _failures_reported(chosen, place):
             found = run_detector(place, chosen, seed=seed)
-        seconds = time.process_time() - started
+        seconds = processor_time() - started
         write_footprints(found, output, overwrite=overwrite)
         if not quiet:
             for note in found.metadata.get("notes", ()):
@@ -115,6 +114,11 @@ def _failures_reported(detector: Detector, scene: Scene) -> Iterator[None]:
         # Standard output is for data: what a plugin prints is a message.
         with redirect_stdout(sys.stderr):
             yield
+    except ProgramError as error:
+        typer.echo(
+            "\n".join(filter(None, [error.log, f"Error: {detector.name} failed on {scene.name}: {error}"])), err=True
+        )
+        raise typer.Exit(3) from error
     except (RoofbenchError, OSError, typer.Exit):
         raise
     except (Exception, SystemExit) as error:

@@ -32,7 +32,7 @@ from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure, pl
 from .scene_picture import scene_picture
 from .tasks import Task
 
-__all__ = ["detect", "execute", "execute_text", "machine_facts", "random_stream", "score"]
+__all__ = ["detect", "execute", "execute_text", "machine_facts", "processor_time", "random_stream", "score"]
 
 #: The scenes opened last; consecutive tasks of a plan often use the same scene.
 _scenes: OrderedDict[str, Scene] = OrderedDict()
@@ -206,10 +206,14 @@ def _opened(recipe: SceneRecipe) -> Scene:
     return _scenes[key]
 
 
-def _now() -> tuple[float, float]:
-    """Return wall clock and processor time, seconds; that of programs which a detector ran is included."""
+def processor_time() -> float:
+    """Return the processor time of this process and of the programs that it ran, seconds."""
     times = os.times()
-    return time.perf_counter(), time.process_time() + times.children_user + times.children_system
+    return time.process_time() + times.children_user + times.children_system
+
+
+def _now() -> tuple[float, float]:
+    return time.perf_counter(), processor_time()
 
 
 def _cost_since(started: tuple[float, float]) -> Cost:

@@ -1,0 +1,69 @@
+"""GRASS GIS: the modules ``v.lidar.edgedetection``, ``v.lidar.growing`` and ``v.lidar.correction`` (Brovelli et al.).
+
+The three steps give each point a category: 1 terrain, 2 terrain of double returns, 3 object of a double return
+(vegetation), 4 object of a single return (building). Points of category 4 that are high above the interpolated terrain
+are on buildings. The steps get the last return of every pulse, and the first
+return of those with several.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import NearestNDInterpolator
+from scipy.spatial import cKDTree
+
+from .recipe_scene import RecipeCall, read_call, require_program, write_buildings
+
+__all__ = ["main"]
+
+_BUILDING = 4
+_SCRIPT = """set -e
+v.in.ascii -zt --quiet input=all.txt output=all separator=space x=1 y=2 z=3
+v.in.ascii -zt --quiet input=first.txt output=first separator=space x=1 y=2 z=3
+g.region --quiet vector=all res={step} -a
+v.lidar.edgedetection --quiet input=all output=edges ew_step={step} ns_step={step} lambda_g=0.5
+v.lidar.growing --quiet input=edges output=grown first=first
+v.lidar.correction --quiet input=grown output=corrected terrain=terrain
+v.out.ascii --quiet input=corrected layer=2 type=point format=point output=corrected.txt separator=space
+v.out.ascii --quiet input=terrain type=point format=point output=terrain.txt separator=space
+"""
+
+
+def main() -> None:
+    """Run the recipe."""
+    require_program("grass", "the Debian package grass-core")
+    call = read_call(step=4.0)
+    _write_points(call)
+    script = Path("steps.sh")
+    script.write_text(_SCRIPT.format(step=float(call.settings["step"])), encoding="utf-8")
+    command = ["grass", "--tmp-location", "XY", "--exec", "sh", str(script)]
+    subprocess.run(command, check=True)  # noqa: S603 - the program of the recipe, with its own script
+    corrected, terrain = np.loadtxt("corrected.txt", ndmin=2), np.loadtxt("terrain.txt", ndmin=2)
+    below = NearestNDInterpolator(terrain[:, :2], terrain[:, 2])
+    found = corrected[corrected[:, -1] == _BUILDING]
+    found = found[found[:, 2] - below(found[:, 0], found[:, 1]) >= call.settings["height"]]
+    points = np.column_stack([call.points.x - call.extent[0], call.points.y - call.extent[1], call.points.z])
+    on_building = np.zeros(len(points), dtype=np.bool_)
+    if len(found):
+        distance, _ = cKDTree(found[:, :3]).query(points, distance_upper_bound=0.01)
+        on_building = np.isfinite(distance)
+    write_buildings(call, on_building)
+
+
+def _write_points(call: RecipeCall) -> None:
+    """Write last and first returns as text, in metres from the corner of the extent."""
+    points = call.points
+    rows = np.column_stack([points.x - call.extent[0], points.y - call.extent[1], points.z])
+    number, total = points.return_number, points.number_of_returns
+    several = number is not None and total is not None
+    last = number == total if several else np.ones(len(rows), dtype=np.bool_)
+    first = (number == 1) & (total > 1) if several else np.zeros(len(rows), dtype=np.bool_)
+    np.savetxt("all.txt", rows[last], fmt="%.3f")
+    np.savetxt("first.txt", rows[first], fmt="%.3f")
+
+
+if __name__ == "__main__":
+    main()
