@@ -39,6 +39,8 @@ __all__ = [
 ]
 #: Endings of GeoJSON, whole or a feature per line; without a CRS it is in degrees (RFC 7946).
 _JSON_ENDINGS = (".geojson", ".json", ".geojsonl", ".geojsons", ".ndjson", ".jsonl")
+#: What GDAL takes a GeoJSON file to be in that names no CRS: without and with heights.
+_JSON_SYSTEMS = ("EPSG:4326", "EPSG:4979")
 
 #: Geometry type of shapely to that of OGR.
 _KINDS = {1: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon", 0: "Point", 4: "MultiPoint"}
@@ -109,7 +111,7 @@ def read_footprints(
         geometries, columns, own_crs, closed = read_parquet(file)
     else:
         geometries, columns, own_crs, closed = _read_ogr(file, layer)
-    if crs is None and own_crs == "EPSG:4326" and not _means_degrees(file, geometries):
+    if crs is None and own_crs in _JSON_SYSTEMS and not _means_degrees(file, geometries):
         own_crs = None
     crs = crs or own_crs
     if to_crs is not None:

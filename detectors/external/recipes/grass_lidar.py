@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import NearestNDInterpolator
 from scipy.spatial import cKDTree
 
-from .recipe_scene import RecipeCall, read_call, require_program, write_buildings
+from .recipe_scene import RecipeCall, leave, read_call, require_program, write_buildings
 
 __all__ = ["main"]
 
@@ -58,9 +58,11 @@ def _write_points(call: RecipeCall) -> None:
     points = call.points
     rows = np.column_stack([points.x - call.extent[0], points.y - call.extent[1], points.z])
     number, total = points.return_number, points.number_of_returns
-    several = number is not None and total is not None
-    last = number == total if several else np.ones(len(rows), dtype=np.bool_)
-    first = (number == 1) & (total > 1) if several else np.zeros(len(rows), dtype=np.bool_)
+    first, last = np.zeros(len(rows), dtype=np.bool_), np.ones(len(rows), dtype=np.bool_)
+    if number is not None and total is not None:
+        first, last = (number == 1) & (total > 1), number == total
+    if not first.any():
+        leave("the points have no pulses with several returns, which v.lidar.growing needs")
     np.savetxt("all.txt", rows[last], fmt="%.3f")
     np.savetxt("first.txt", rows[first], fmt="%.3f")
 

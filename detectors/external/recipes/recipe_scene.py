@@ -15,7 +15,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import shapely
@@ -31,9 +31,9 @@ from ....scenes.geodata.vector_files import write_footprints
 from ...shared.morphology import closed, opened
 from ...shared.regularise import regularise
 
-__all__ = ["DEFAULTS", "RecipeCall", "read_call", "require_program", "required_module", "write_buildings"]
+__all__ = ["DEFAULTS", "RecipeCall", "leave", "read_call", "require_program", "required_module", "write_buildings"]
 
-#: Exit code that says that the tool is not installed.
+#: Exit code that says that the tool or an input is missing.
 _SKIP = 77
 #: Least height above ground of building points where the tool gives none (m), radius of the opening (m), least area
 #: (m2), and cell size (m; 0: 1.4 times the point spacing, 0.25 to 2 m).
@@ -83,13 +83,13 @@ def required_module(name: str, package: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        _leave(f"{package} is not installed: pip install {package}")
+        leave(f"{package} is not installed: pip install {package}")
 
 
 def require_program(name: str, package: str) -> None:
     """Leave with the exit code for a missing tool unless there is an executable of that name."""
     if shutil.which(name) is None:
-        _leave(f"{name} is not installed: it is part of {package}")
+        leave(f"{name} is not installed: it is part of {package}")
 
 
 def write_buildings(call: RecipeCall, on_building: NDArray[np.bool_]) -> None:
@@ -118,6 +118,7 @@ def write_buildings(call: RecipeCall, on_building: NDArray[np.bool_]) -> None:
     write_footprints(Footprints.of(outlines, crs=call.crs), call.output)
 
 
-def _leave(reason: str) -> Any:
+def leave(reason: str) -> NoReturn:
+    """Leave with the exit code for a detector that cannot run here."""
     print(reason, file=sys.stderr)
     raise SystemExit(_SKIP)

@@ -365,3 +365,13 @@ def test_a_shapefile_without_its_projection_has_no_crs(tmp_path):
     shutil.rmtree(tmp_path / "none", ignore_errors=True)
     with pytest.raises(InputError, match=r"out\.shp cannot be read"):
         rb.read_footprints(tmp_path / "out.shp")
+
+
+def test_geojson_in_metres_with_heights_and_without_a_crs_is_read(tmp_path):
+    ring = [[500_000, 5_700_000, 7], [500_010, 5_700_000, 7], [500_010, 5_700_010, 7], [500_000, 5_700_000, 7]]
+    feature = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    file = tmp_path / "roofs.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    found = rb.read_footprints(file)
+    assert found.crs is None
+    assert found.areas == pytest.approx([50.0])
