@@ -102,7 +102,12 @@ def entries_of(name: str) -> list[Entry]:
     """
     word = name if ".py" in name else parse_selection(name)[0]
     if ".py" in word or word in DETECTORS.names() or word in EVALUATORS.names():
-        plugin = find_plugin(name)
+        try:
+            plugin = find_plugin(name)
+        except ParameterError:
+            if word != name:
+                raise
+            return [_plugin_entry(word, detector=word in DETECTORS.names())]  # it cannot be made without parameters
         return [_described(plugin, name=name if ".py" in word else word)]
     if word in suite_names():
         return [_suite_entry(word)]
@@ -177,7 +182,7 @@ def _described(plugin: Detector | Evaluator | type[Detector | Evaluator], *, nam
         # A selection such as original[mode=paper]: its values, those that the mode sets included.
         values = plugin.values()
         parameters = tuple(replace(rule, default=values[rule.name]) for rule in parameters)
-    changed = _example_value(parameters)
+    changed = _example_value(parameters) or _required_value(kind)
     selection = f"'{name}[{changed}]'" if changed else name
     if issubclass(kind, Detector):
         return Entry(
@@ -213,6 +218,17 @@ def _example_value(parameters: tuple[Parameter, ...]) -> str:
         for value in (*rule.swept, *rule.choices):
             if value != rule.default:
                 return f"{rule.name}={parameter_text(value)}"
+    return ""
+
+
+def _required_value(kind: type[Detector | Evaluator]) -> str:
+    """Return ``name=...`` of the first parameter of a class that cannot be made without; else empty."""
+    try:
+        kind.build()
+    except ParameterError:
+        return f"{next(iter(kind.parameters()))}=..."
+    except ImportError:
+        return ""
     return ""
 
 
