@@ -1,1 +1,1 @@
-"""What is run: suites, runner, results store, command line."""
+"""What is run and what follows from it: suites, runner, results store, analyses."""

@@ -1,4 +1,4 @@
-"""The beginnings of plugins and suites: complete, working examples to start from.
+"""Templates of plugins and suites: complete, working examples to start from.
 
 ``roofbench new detector NAME`` writes a folder with the example, a test, a README and a workflow that runs the test in
 the user's own repository. Templates are text in which ``@name@``, ``@module@`` and ``@Class@`` are replaced.

@@ -1,4 +1,4 @@
-"""Completion of names by the shell: what a word that has been started can become."""
+"""Shell completion of names."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ __all__ = ["detectors", "evaluators", "everything", "indices", "plugins", "prese
 
 
 def detectors(incomplete: str) -> list[str]:
-    """Return the detectors that start so."""
+    """Return the detectors that start with the typed text."""
     from ..detectors.registry import DETECTORS
 
     return _starting(DETECTORS.names(), incomplete)
 
 
 def evaluators(incomplete: str) -> list[str]:
-    """Return the evaluators that start so."""
+    """Return the evaluators that start with the typed text."""
     from ..evaluators.registry import EVALUATORS
 
     return _starting(EVALUATORS.names(), incomplete)
 
 
 def everything(incomplete: str) -> list[str]:
-    """Return all names that start so."""
+    """Return all names that start with the typed text."""
     return [*plugins(incomplete), *suites_and_scenes(incomplete), *indices(incomplete)]
 
 
 def indices(incomplete: str) -> list[str]:
-    """Return the keys of indices that start so, of every evaluator."""
+    """Return the keys of indices of all evaluators that start with the typed text."""
     from ..evaluators.registry import EVALUATORS, make_evaluator
 
     keys = [index.key for name in EVALUATORS.names() for index in make_evaluator(name).indices]
@@ -35,26 +35,26 @@ def indices(incomplete: str) -> list[str]:
 
 
 def plugins(incomplete: str) -> list[str]:
-    """Return the detectors and evaluators that start so."""
+    """Return the detectors and evaluators that start with the typed text."""
     return [*detectors(incomplete), *evaluators(incomplete)]
 
 
 def presets(incomplete: str) -> list[str]:
-    """Return the synthetic scenes that start so."""
+    """Return the synthetic scenes that start with the typed text."""
     from ..benchmark.identity.recipes import preset_names
 
     return _starting(preset_names(), incomplete)
 
 
 def suites(incomplete: str) -> list[str]:
-    """Return the suites that start so."""
+    """Return the suites that start with the typed text."""
     from ..benchmark.suite import suite_names
 
     return _starting(suite_names(), incomplete)
 
 
 def suites_and_scenes(incomplete: str) -> list[str]:
-    """Return the suites, scenes, presets and scene folders that start so."""
+    """Return the suites, scenes, presets and scene folders that start with the typed text."""
     from pathlib import Path
 
     from ..scenes.shipped import shipped_names

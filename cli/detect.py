@@ -79,7 +79,7 @@ def detect(
     (recipe,) = scenes_of([scene])
     place = recipe.open()
     if Path(scene).exists():
-        _ = place.content_hash  # tells a file that was edited or replaced since the scene was made
+        _ = place.content_hash  # raises where a file was edited or replaced since the scene was made
     if output is not None:
         started = processor_time()
         with _failures_reported(chosen, place):

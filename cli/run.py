@@ -115,7 +115,7 @@ def run(
                 f"{len(plan.left_out)} runs of the suite are not stored and were left out: run without --retry-failed "
                 "to execute them"
             )
-        # Files before the table: who reads it may close the pipe (head).
+        # Files first: the reader of the table may close the pipe (head).
         if output is not None:
             write_leaderboards(output, boards)
             if any(entry.scenes for board in boards for entry in board.entries):

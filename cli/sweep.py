@@ -98,7 +98,7 @@ def sweep(
         planned = make_sweep(suite, [axis_of(text) for text in vary or ()], opened, grid=grid)
         with run_progress(planned.plan, console, verbose=options.verbose) as report:
             table, rows = run_sweep(planned, opened, execution=execution, progress=report)
-    # The file before the table: who reads that may close the pipe (head).
+    # The file first: the reader of the table may close the pipe (head).
     if output is not None:
         write_table(table, output, overwrite=overwrite)
         console.print(f"{output}: {len(table)} rows", markup=False)

@@ -14,7 +14,7 @@
         └── UnsupportedError      the operation is not offered by this detector or evaluator
 
 Each message is one sentence that says what is wrong, where, which rule it breaks and what to do. The command line
-prints it and leaves with exit code 2; it never shows a traceback for these.
+prints it and exits with code 2; it never shows a traceback for these.
 """
 
 __all__ = [

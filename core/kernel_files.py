@@ -46,7 +46,7 @@ def load(folder: Path, name: str) -> bytes | None:
     if hashlib.sha256(data[_CHECKSUM:]).digest() != data[:_CHECKSUM]:
         remove(folder, name)
         return None
-    with contextlib.suppress(OSError):  # a cache that can only be read serves all the same
+    with contextlib.suppress(OSError):  # a read-only cache still works
         if time.time() - path.stat().st_mtime > _DAY:
             os.utime(path)
     return data[_CHECKSUM:]
@@ -85,7 +85,7 @@ def clean(folder: Path, *, oldest: float = _OLDEST, largest: int = _LARGEST) -> 
     ----------
     folder : Path
     oldest : float
-        Time after the last use at which an entry goes, s.
+        Time after the last use at which an entry is removed, s.
     largest : int
         Size of all entries together, bytes.
     """

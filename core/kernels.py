@@ -121,7 +121,7 @@ def _enable_caching(dispatcher: Any) -> None:
 
 
 def _stay_without_cache(wrapper: Any) -> None:
-    """Stand for ``enable_caching`` of what has no cache that sees its dependencies."""
+    """Replace ``enable_caching`` where no cache sees the dependencies, and do nothing."""
 
 
 class _KernelCache(FunctionCache):

@@ -1,6 +1,6 @@
 """Output files appear whole or not at all.
 
-`whole_file` and `whole_folder` hand out a temporary path beside the target and move it into place only when the block
+`whole_file` and `whole_folder` yield a temporary path beside the target and move it into place only when the block
 ends without an error, so an interrupted command leaves what was there before.
 """
 
@@ -80,7 +80,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
 
 @contextmanager
 def whole_folder(path: str | os.PathLike[str], *, holds: Sequence[str], overwrite: bool = False) -> Iterator[Path]:
-    """Yield a temporary folder; on success it replaces `path`, which may hold nothing but what `holds` names."""
+    """Yield a temporary folder; on success it replaces `path`, which may contain only names that match `holds`."""
     target = Path(path)
     check_folder(target, overwrite, holds=holds)
     with _scratch(target) as scratch:

@@ -1,4 +1,4 @@
-"""Names: how things that have one are found, and what is answered when there is no such name.
+"""Registries: classes found by name, and the error for an unknown name.
 
 A *registry* maps names to classes without importing them: built-in ones are given as ``"module:Class"``, others come
 from entry points of installed packages or from a file named by the user (``path/to/file.py:Class``).

@@ -1,1 +1,1 @@
-"""What people see: tables, plots, maps."""
+"""Text, tables, maps, figures and pages, drawn from finished results."""

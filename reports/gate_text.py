@@ -12,7 +12,7 @@ from .tables import Column, Table, escaped_markdown
 __all__ = ["format_gate", "gate_summary"]
 
 _MARKS = dict(zip(CONCLUSIONS, ("🟢", "🔴", "⚪", "🟡", "⚫"), strict=True))
-#: Share of the variance from which on more seeds are worth their time.
+#: Least share of the variance at which more seeds are worth their time.
 _MOST_SHARE = 0.5
 _COLUMNS = (
     *(Column(title, "left") for title in ("detector", "index", "conclusion")),

@@ -1,6 +1,6 @@
 """The report as one HTML file: no network, a strict content security policy, all data escaped.
 
-The page is a jinja2 template with autoescape; tables and charts stand in it as they are, maps are drawn by a script
+The page is a jinja2 template with autoescape; tables and charts are inserted as they are, maps are drawn by a script
 of our own from JSON in the page. Only that script may run: the policy names its hash.
 """
 

@@ -1,4 +1,4 @@
-"""A scene as one picture: what it looks like, how high it is, and what is true of it, side by side.
+"""A scene as one picture: orthoimage, height above ground and reference, side by side.
 
 Panels: the orthoimage (where there is none, the laser intensity, else the height); the height above ground, shaded; the
 reference footprints and the evaluation area over the relief.

@@ -1,1 +1,1 @@
-"""What the world looks like: footprints, rasters, points, scenes, import and the synthetic generator."""
+"""Scenes and their parts: footprints, rasters, points, scenes, import and the synthetic generator."""

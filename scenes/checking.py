@@ -1,4 +1,4 @@
-"""Check of a scene folder: does it hold what its manifest says, do its parts fit together, and what are they like.
+"""Check of a scene folder: against its manifest, of its parts against each other, with facts about each.
 
 A *fact* is a number or text about one part (``points``, ``image``, ``dem``, ``reference``, ``area``, ``scene``); a
 *problem* is one sentence about something that makes results on this scene wrong.

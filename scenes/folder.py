@@ -67,7 +67,7 @@ SCENE_FILES = (
     "*.lax",
     "LICENCE.txt",
 )
-#: Version of the layout; raised when a folder of before cannot be read any more.
+#: Version of the layout; raised when older folders can no longer be read.
 _FORMAT = 1
 
 
@@ -175,7 +175,7 @@ def changed_files(path: str | os.PathLike[str]) -> list[str]:
 
 
 def update_checksums(path: str | os.PathLike[str]) -> list[str]:
-    """Take the files as they are now into the manifest, after an edit that is meant; return those that differed."""
+    """Write the checksums of edited files into the manifest, and return the files that differed."""
     changed = changed_files(path)
     folder, manifest = read_manifest(path)
     for entry_kind, entry in manifest.get("files", {}).items():

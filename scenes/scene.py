@@ -1,8 +1,8 @@
-"""Scenes: one place with what was measured there and what is true of it.
+"""Scenes: the measurements of one place, with its ground truth.
 
 A *scene* has a name, an extent in metres of a projected CRS, and any of: points, orthoimage, DEM (bare earth),
 reference footprints and evaluation area (where the reference is complete). Each is read when it is first asked for.
-What a detector gets is `Scene.for_detection`: measurements only, neither reference nor classification.
+A detector receives `Scene.for_detection`: measurements only, neither reference nor classification.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class LayerFiles(Protocol):
 
 
 class Scene:
-    """A place with its measurements and its truth.
+    """A place with its measurements and its ground truth.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Analysis: what stored results amount to."""
+"""Analysis of stored results."""

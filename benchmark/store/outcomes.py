@@ -1,4 +1,4 @@
-"""Outcomes: what became of a run, as the store keeps it and as bytes that any executor can carry.
+"""Outcomes: the result of a run, as the store keeps it and as bytes that any executor can carry.
 
 An *outcome* has a status (``ok``, ``failed`` or ``skipped``) with its reason, the cost, the raw detections, and one
 *score* for each evaluator. The *record* of a scene holds what is needed to evaluate and to draw it without opening it.

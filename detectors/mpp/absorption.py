@@ -1,4 +1,4 @@
-"""Absorption: a large building takes in smaller neighbours that are parts of its roof."""
+"""Absorption: a large building absorbs smaller neighbours that are parts of its roof."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["absorb"]
 #: Share of a joined rectangle that its two parts fill, share of their energy that it has by itself before it descends,
 #: and share of a third building inside it from which on that one is absorbed as well.
 _FILLED, _HOPEFUL, _INSIDE = 0.7, 0.8, 0.7
-#: Square metres: a house in a row is not larger than the first, and does not stand against one larger than the second.
+#: Square metres: a house in a row is at most as large as the first, and adjoins no building larger than the second.
 _HOUSE, _HALL = 200.0, 500.0
 
 

@@ -18,7 +18,7 @@ from .windows import Window, window_energy
 
 __all__ = ["Annealed", "Boxes", "Schedule", "anneal", "search"]
 
-#: Buildings that a window may hold besides its boxes and those that are there.
+#: Buildings that a window may hold besides its boxes and its present buildings.
 _ROOM = 64
 #: Boxes for which there is room, at most.
 _MOST_BOXES = 4000
@@ -51,7 +51,7 @@ class Boxes:
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
-    """How a window is worked on.
+    """How a window is processed.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def search(window: Window, start: Rectangles, boxes: Boxes, *, capacity: int, sw
 
 
 def anneal(window: Window, boxes: Boxes, own: Rectangles, schedule: Schedule, state: RandomState) -> Annealed:
-    """Work on one window.
+    """Process one window.
 
     Parameters
     ----------

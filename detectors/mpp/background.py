@@ -1,4 +1,4 @@
-"""Background: what texture and height are like in crowns, and the texture of roofs, estimated from the scene.
+"""Background: texture and height of crowns, and texture of roofs, estimated from the scene.
 
 Nouns
 -----
@@ -7,9 +7,9 @@ class
 evidence
     log p(texture | roof) - log p(texture | crown), nats.
 
-Textures of the two classes are estimated by EM (expectation maximisation) on a histogram of cells, and kept near what
-roofs and crowns are by pseudo-counts, so that a scene of roofs alone or of crowns alone keeps two classes. The heights
-of crowns are Gaussian as in Yu, Li, Guan & Wang (2013), equation 1.
+Textures of the two classes are estimated by EM (expectation maximisation) on a histogram of cells, and kept near
+typical values by pseudo-counts, so that a scene of roofs alone or of crowns alone keeps two classes. The heights of
+crowns are Gaussian as in Yu, Li, Guan & Wang (2013), equation 1.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .threads import ONE_THREAD, Threads
 
 __all__ = ["Background", "estimate_background"]
 
-#: What roofs and crowns are like before a scene is seen: median roughness (m) in windows of cells of `_COMMON` metres,
+#: Priors of roofs and crowns: median roughness (m) in windows of cells of `_COMMON` metres,
 #: spread of its logarithm, openness. A wider window holds more ridges and steps: roofs grow as the cell, crowns as its
 #: square root.
 _ROOF_ROUGHNESS, _CROWN_ROUGHNESS = (0.05, 0.75), (0.40, 0.55)
@@ -41,7 +41,7 @@ _STEPS = 20
 _NARROW, _WIDE = 0.4, 1.0
 #: Range of the share of crowns, and pseudo-counts of each class in it.
 _FEWEST_CROWNS, _MOST_CROWNS, _SHARE_CELLS = 0.02, 0.98, 100.0
-#: Metres: mean and standard deviation of heights in crowns before a scene is seen, by so many pseudo-counts, and the
+#: Metres: prior mean and standard deviation of heights in crowns, weighted as so many pseudo-counts, and the
 #: least standard deviation.
 _CROWN_HEIGHT, _CROWN_SPREAD, _HEIGHT_CELLS, _LEAST_SPREAD = 6.0, 3.0, 100.0, 2.0
 
@@ -130,7 +130,7 @@ def estimate_background(cells: Cells, *, threads: Threads = ONE_THREAD) -> tuple
         share = float(np.clip(in_crowns / (size_of_sample + 2 * _SHARE_CELLS), _FEWEST_CROWNS, _MOST_CROWNS))
     likelihoods = _log_likelihoods(logs, means, spreads, opens)
     evidence = likelihoods[0] - likelihoods[1]
-    # A smoother window is never less of a roof: the tail of the narrower class must not turn the ratio round.
+    # A smoother window is never less likely to be a roof: the tail of the narrower class must not reverse the ratio.
     evidence = np.minimum.accumulate(evidence, axis=0)
     evidence = np.minimum.accumulate(evidence, axis=1)
     size, rise, squares = belongs.ravel() @ (tally * np.array([1.0, 1e-2, 1e-4]))

@@ -11,7 +11,7 @@ block
     Connected part of what is built, after small holes are filled and narrow parts between rectangles cut off, that lies
     at least half inside rectangles. Its outline gets straight walls (`regularise`).
 
-A rectangle finds a house and places its party walls; an old block is no rectangle, and its cells know its edge better.
+Rectangles locate houses and their party walls. An old block is seldom rectangular: its cells show its edge better.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = ["outline_blocks"]
 
 #: Metres: sigma of the mean of evidence, radius of the opening, least distance of points that are no wall.
 _SIGMA, _OPENING, _STRAIGHT = 0.75, 1.0, 0.5
-#: Metres: width of the gaps in which every high cell is built. A crown needs more room.
+#: Metres: width of the gaps in which every high cell is built. Crowns are wider.
 _NARROW = 5.0
 #: Square metres: largest hole that is filled, smallest block.
 _HOLE, _SMALLEST = 10.0, 5.0
@@ -64,9 +64,9 @@ def outline_blocks(
 
 
 def _traced(built: NDArray[np.bool_], grid: Grid) -> NDArray[np.object_]:
-    """Return the outlines of blocks, each whole, those that begin in one strip of rows at a time.
+    """Return the whole outlines of blocks, traced strip by strip of the rows in which they begin.
 
-    The library that traces takes 34 bytes for each cell that it is given.
+    The tracing library takes 34 bytes per cell.
     """
     import cv2
 

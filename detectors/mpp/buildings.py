@@ -5,8 +5,8 @@ Nouns
 nearness
     Of a place to a rectangle: its distance in cells, inside the negative distance from the nearest side.
 zone
-    Where a rectangle is nearer than all others, and not far. Two that touch meet in their common wall and in the line
-    that goes on from it.
+    Where a rectangle is nearer than all others, and not far. Two that touch meet in their common wall and in its
+    extension.
 
 A building is the common area of its zone and its block, or the whole block of which it is the only one, where the
 rectangle does not describe that as well.
@@ -26,7 +26,7 @@ from .rectangles import corners, to_world
 
 __all__ = ["block_of", "outline_buildings"]
 
-#: Common area over joint area from which the rectangle is as good an outline.
+#: Intersection over union from which the rectangle is as good an outline.
 _AS_GOOD = 0.95
 #: Metres: how far a zone reaches from its rectangle, and by how much vertices of an outline may move.
 _REACH, _STRAIGHT = 10.0, 0.05
@@ -93,7 +93,7 @@ def outline_buildings(
 
 
 def _part(rectangle: NDArray[np.float64], rivals: NDArray[np.float64], block: Any, grid: Grid) -> Any:
-    """Return the common area of a block and the zone of a rectangle, which reaches to its rivals, shape (m, 5)."""
+    """Return the common area of a block and the zone of a rectangle, which ends at its neighbours, shape (m, 5)."""
     place = corners(rectangle)[0]
     reach = _REACH / grid.gsd
     left, top = np.floor(place.min(axis=0) - reach).astype(int) - 1
@@ -105,13 +105,13 @@ def _part(rectangle: NDArray[np.float64], rivals: NDArray[np.float64], block: An
     lead = reach - own
     for rival in rivals:
         np.minimum(lead, _nearness(rival, x, y) - own, out=lead)
-    # Where the lead is more than nothing, the "coverage" is more than one half.
+    # The "coverage" is more than one half where the lead is positive.
     zone = shapely.union_all(trace((lead + 0.5).astype(np.float32), window))
     return shapely.simplify(_whole(shapely.intersection(zone, block)), _STRAIGHT)
 
 
 def _whole(outline: Any) -> Any:
-    """Return an outline without its scraps; the largest part always stays."""
+    """Return an outline without its small parts; the largest is always kept."""
     parts = shapely.get_parts(outline)
     parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
     if len(parts) < 2:

@@ -1,11 +1,11 @@
-"""Boxes that the data suggest: where the sampler tries births first. The energy decides about every one of them.
+"""Boxes that the data suggest: where the sampler tries births first. Each is accepted or refused by the energy.
 
 Nouns
 -----
 roof cells
     High cells whose texture is that of a roof.
 patch
-    Roof cells connected through steps no higher than a limit. Several limits are used: a low one parts houses of
+    Roof cells connected through steps no higher than a limit. Several limits are used: a low one separates houses of
     different height, no limit keeps a block together.
 box
     Rectangle in the grid frame. Each patch is turned to the angle at which its bounding rectangle is smallest (one that
@@ -86,7 +86,7 @@ def _boxes_of_patches(
 def _boxes(
     members: Labels, starts: Integers, first: int, last: int, finer: Labels, least_cells: int, shape: tuple[int, int]
 ) -> Rectangles:
-    """Return the boxes of some patches but those that are also patches of `finer` labels, which had them already."""
+    """Return the boxes of some patches, except of those that are patches of the `finer` labels, too."""
     boxes = np.empty(((_PIECES + 1) * (last - first), 5))
     n = 0
     for patch in range(first, last):
@@ -100,7 +100,7 @@ def _boxes(
 
 @kernel
 def _is_patch(labels: Labels, cells: Labels) -> bool:
-    """Whether all cells have one label; a finer step only parts patches, so that this label has no other cells."""
+    """Whether all cells have one label; a finer step only splits patches, so that this label has no other cells."""
     if len(labels) == 1:
         return False
     label = labels[cells[0, 0], cells[0, 1]]

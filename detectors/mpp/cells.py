@@ -41,7 +41,7 @@ __all__ = ["FEWEST_POINTS", "HIGH", "LOW", "VOID", "Cells", "cell_size", "has_po
 
 VOID, LOW, HIGH = np.uint8(0), np.uint8(1), np.uint8(2)
 
-#: Scenes with fewer points hold nothing that can be detected.
+#: In scenes with fewer points no building can be detected.
 FEWEST_POINTS = 20
 
 #: Points higher above ground than this many metres are birds and clouds (the tallest building of 2025 has 828 m).
@@ -76,7 +76,7 @@ class Cells:
 
 
 def has_points(z: Floats) -> bool:
-    """Return whether a scene has enough finite elevations; the first ones are looked at first."""
+    """Return whether a scene has enough finite elevations; the first ones are checked first."""
     return any(np.count_nonzero(np.isfinite(part)) >= FEWEST_POINTS for part in (z[: 100 * FEWEST_POINTS], z))
 
 
@@ -84,7 +84,7 @@ def cell_size(x: Floats, y: Floats, extent: Sequence[float], *, threads: Threads
     """Return the cell size in metres for a mean point spacing: 0.5 to 2 m in steps of 0.25.
 
     Half the spacing and 0.2 m, rounded up: at 3 points per m2 0.5 m, at 1 point 0.75 m. Cells that no point falls into
-    are filled from their neighbours, which costs less than what larger cells blur (docs/results/mpp.md). Squares of
+    are filled from their neighbours, which loses less detail than larger cells (docs/results/mpp.md). Squares of
     4 m without a point do not count as covered (water, a ragged border).
     """
     coarse = Grid.covering(extent, 4.0)
@@ -107,7 +107,7 @@ def make_cells(
     Parameters
     ----------
     points : PointCloud
-        Any returns; points that are not finite, outside the grid or in the sky are passed over.
+        Any returns; points that are not finite, outside the grid or in the sky are ignored.
     ground : Elevation
         Bare earth.
     grid : Grid
@@ -136,7 +136,7 @@ def make_cells(
         _add_tops(cloud, band, counts, tops)
         _summarise(counts, tops, first, last, height, state, openness)
 
-    # Every band goes through all points: no more bands than threads.
+    # Every band reads all points: no more bands than threads.
     threads.bands(work, grid.rows, each=1)
     threads.bands(lambda first, last: _despike(height, state, first, last, other), grid.rows)
     threads.bands(lambda first, last: _fill(height, openness, other, first, last, state), grid.rows)
@@ -178,7 +178,7 @@ class _Count(IntEnum):
 @kernel(inline="always")
 def _cell_of(x: float, y: float, band: _Band) -> int:
     """Return the flat cell of a place, -1 outside the band."""
-    # The points of other threads are passed over before anything is divided.
+    # The points of other threads are skipped before the division.
     if not ((band.first - 1) * band.cell < band.north - y < (band.last + 1) * band.cell):
         return -1
     row, column = (band.north - y) / band.cell, (x - band.west) / band.cell
@@ -217,7 +217,7 @@ def _count(cloud: _Cloud, band: _Band, low: int, counts: Labels) -> None:
 def _add_tops(cloud: _Cloud, band: _Band, counts: Labels, tops: Labels) -> None:
     """Fill number and sum of the heights of the points near the top of their cell, tops of shape (cells, 2).
 
-    Heights are computed a second time, since keeping them would take more memory than all else in a dense cloud.
+    Heights are computed a second time, since in a dense cloud keeping them would take the most memory of all.
     """
     for i in range(len(cloud.x)):
         k = _cell_of(cloud.x[i], cloud.y[i], band)

@@ -36,7 +36,8 @@ _MERGE_REACH = 20.0
 _PER_AREA, _PER_BOX = 0.2, 60
 #: Rows of a trace.
 _ROWS = 100
-#: Along the seams: local-search sweeps at most, and buildings that a window may hold besides those that are there.
+#: Along the seams: maximum number of local-search sweeps, and buildings that a window may hold besides the present
+#: ones.
 _SEAM_SWEEPS, _SEAM_ROOM = 4, 64
 #: Share of the energy of a rectangle by which an edge that closes a wall may raise it.
 _WALL_TOLERANCE = 0.25
@@ -45,7 +46,7 @@ _WALL_TOLERANCE = 0.25
 def sample_city(
     parameters: MPPParameters, prepared: Prepared, seed: int, threads: Threads
 ) -> tuple[Rectangles, list[Annealed]]:
-    """Anneal every tile, then search along the seams, close the walls and absorb what is no building by itself."""
+    """Anneal every tile, then search along the seams, close the walls and absorb parts of larger buildings."""
     grid, model, tables = prepared.grid, prepared.model, prepared.tables
     size = max(parameters.tile, 2.0 * parameters.largest_side)
     reach = math.sqrt(2.0) * model.largest_side
@@ -80,7 +81,7 @@ def sample_city(
 
 
 def _schedule(parameters: MPPParameters, tile: Tile, cell: float, boxes: int) -> Schedule:
-    """Return how a tile is worked on: proposals by its area, and for each box."""
+    """Return how a tile is processed: proposals by its area, and for each box."""
     x0, y0, x1, y1 = tile.window
     area = (x1 - x0) * (y1 - y0) * cell * cell
     proposals = max(int(parameters.effort * (_PER_AREA * area + _PER_BOX * boxes)), 1)

@@ -102,7 +102,7 @@ def rectangle_energies(tables: Tables, rectangles: Rectangles, model: Model) -> 
 
 @kernel
 def energy_below(tables: Tables, rectangle: Rectangles, model: Model, limit: float) -> float:
-    """Return the energy of a rectangle by itself if it is less than a limit, else some number that is not.
+    """Return the energy of a rectangle by itself if it is less than a limit, else any number not less than the limit.
 
     Most proposals are refused: where even the best roof would not reach the limit, no roof is fitted.
     """
@@ -134,7 +134,7 @@ def least_energy(tables: Tables, rectangle: Rectangles, model: Model) -> float:
 
 @kernel
 def overlaps(rectangles: Rectangles, count: int, rectangle: Rectangles, skip: int, other: int) -> float:
-    """Return the area, cells squared, that a rectangle shares with the first `count`, two of them passed over."""
+    """Return the area, cells squared, that a rectangle shares with the first `count`, two of them skipped."""
     area = 0.0
     reach = 0.5 * math.hypot(rectangle[2], rectangle[3])
     for i in range(count):

@@ -1,4 +1,4 @@
-"""Frames: rectangles whose border is one roof all round, whatever stands higher inside.
+"""Frames: rectangles whose border is one roof level all round; parts of the inside may be higher.
 
 Nouns
 -----
@@ -140,7 +140,7 @@ def _waves(boxes: Rectangles, rows: int, columns: int) -> Integers:
     wave = np.zeros(len(boxes), dtype=np.int64)
     grown = boxes.copy()
     grown[:, 2:4] += 2 * _REACH
-    # The boxes before that meet a square of the grid are linked, the last one first.
+    # Earlier boxes that meet a square of the grid are linked, the last one first.
     last = np.full((rows // _SQUARE + 1, columns // _SQUARE + 1), -1, dtype=np.int64)
     links, size = np.empty((4 * len(boxes) + 64, 2), dtype=np.int64), 0
     for k in range(len(boxes)):
@@ -340,7 +340,7 @@ def _lower_one(surface: _Surface, box: Rectangles) -> None:
             higher += above > surface.step
     if higher == 0 or lower > _LOWER * all_known or smooth < _SMOOTH * all_known:
         return
-    # Storeys are marked first: their cells are lowered to the plane of what is none.
+    # Storeys are marked first: their cells are lowered to the plane of the other cells.
     storeys = _Storeys(np.zeros(most - least + 1, dtype=np.bool_), least)
     _mark_storeys(surface, cells, known, base, storeys)
     if storeys.marked.any():

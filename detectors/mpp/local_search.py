@@ -102,7 +102,7 @@ def _add_boxes(
 def _improve(window: Window, buildings: Buildings, count: int, i: int, wake: bool) -> tuple[float, int, int]:
     """Descend, remove, split and merge building i.
 
-    Returns the gain, the number of buildings and the number of the building to look at next. With `wake` its
+    Returns the gain, the number of buildings and the number of the building to examine next. With `wake` its
     neighbours count as fresh after a gain: they may now move, too.
     """
     rectangles, energies, fresh = buildings.rectangles, buildings.energies, buildings.fresh

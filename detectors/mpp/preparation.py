@@ -1,7 +1,7 @@
 """From the cloud to what the sampler reads: cells, classes, tables and boxes.
 
-At 38 bytes per cell the tables and what they are made of take the most memory at any time; arrays are released as soon
-as they are no longer needed.
+The tables and their inputs set the peak memory, 38 bytes per cell; arrays are released as soon as they are no longer
+needed.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Prepared:
         Thousandths of a nat.
     background : Background
     tables : Tables
-        `tables.NO_TABLES` once they have served.
+        `tables.NO_TABLES` after use.
     model : Model
     boxes : Boxes
     """
@@ -104,7 +104,7 @@ def _rated(rectangles: Rectangles, tables: Tables, model: Model, threads: Thread
 
 
 def _shortened(height: Heights, threads: Threads) -> NDArray[np.uint16]:
-    """Return heights that are only read from here on: two bytes hold them."""
+    """Return heights in two bytes each; they are only read from here on."""
     short = np.empty(height.shape, dtype=np.uint16)
 
     def work(first: int, last: int) -> None:

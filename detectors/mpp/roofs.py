@@ -141,8 +141,8 @@ def choose_roof(
     explained : float
         Variance of heights, m2, that the roof need not explain: only what exceeds it counts.
     needed : float
-        Roofs that cannot be likelier than this are not tried: the likelihood is right if it is more than this, else
-        it is some number that is not.
+        Roofs that cannot be likelier than this are not tried: the likelihood is exact if it is more than this, else any
+        number that is not more.
 
     Returns
     -------

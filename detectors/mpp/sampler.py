@@ -262,7 +262,7 @@ def _try_change(window: Window, chain: _Chain, count: int, odds: _Odds, kind: in
         return False, 0.0
     rest = -energies[i] - model.overlap * shared_area(window, rectangles, count, rectangles[i], i, -1)
     alone = energy_below(window.tables, new, model, odds.limit - rest)
-    # Overlap is never negative: what the data refuse is not compared with the neighbours.
+    # Overlap is never negative: a change that the data refuse needs no comparison with the neighbours.
     if alone + rest >= odds.limit:
         return False, 0.0
     rest += model.overlap * shared_area(window, rectangles, count, new, i, -1)
@@ -274,7 +274,7 @@ def _try_change(window: Window, chain: _Chain, count: int, odds: _Odds, kind: in
 
 @kernel
 def _drawn_move(draw: float, schedule: ChainSchedule) -> Move:
-    """Return the move that a uniform number stands for."""
+    """Return the move that a uniform number selects."""
     if draw < schedule.jump_share:
         return Move.BIRTH if draw < 0.5 * schedule.jump_share else Move.DEATH
     if draw < schedule.jump_share + schedule.split_share:

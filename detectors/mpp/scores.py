@@ -32,7 +32,7 @@ from .threads import ONE_THREAD, Threads
 
 __all__ = ["Weights", "fitted_cells", "mean_evidence", "restrain", "score_cells"]
 
-#: log p(height | crown) is not less than this, so that a bird or a tower is no proof of anything.
+#: log p(height | crown) is not less than this, so that a bird or a tower is limited evidence.
 _HEIGHT_FLOOR = -5.0
 #: Metres along x and y within which the scores of high cells are averaged.
 _AROUND = 1.0

@@ -93,7 +93,7 @@ def descend(window: Window, buildings: Buildings, count: int, i: int) -> float:
             _change(rectangles[i], kind, step, new)
             if not allowed(window, new):
                 continue
-            # Overlap is never negative: what the data refuse is not compared with the neighbours.
+            # Overlap is never negative: a change that the data refuse needs no comparison with the neighbours.
             limit = energies[i] + model.overlap * shared - LEAST_GAIN
             alone = energy_below(window.tables, new, model, limit)
             if alone >= limit:
@@ -229,7 +229,7 @@ def replace_by_boxes(
         for v in range(many):
             i = replaced[v]
             delta -= energies[i] + model.overlap * _shared(window, buildings, count, i)
-            # Overlap between two that go is counted with each: give one half back.
+            # The overlap of two buildings that are both removed was subtracted with each: add it once.
             for w in range(many):
                 if w != v:
                     j = replaced[w]

@@ -1,4 +1,4 @@
-"""Strips: what lies along a much larger building, or is slender and lies along a larger one, is a part of it.
+"""Strips: rectangles along a much larger building, and slender ones along a larger one, are parts of it.
 
 Nouns
 -----
@@ -8,8 +8,8 @@ strip
     two levels, a canopy along a wall, the rest of a wing beside a penthouse. A house in a row is none.
 
 A strip is absorbed by the building that it lies against where the larger rectangle has less energy than that building
-by itself, and left out otherwise. So the sampled energy may rise: that no building is a strip is a rule of what a
-building is, like its least side, but one that needs the neighbours to be known.
+by itself, and left out otherwise. So the energy may rise: like the least side this is a rule about what a building is,
+but it needs the neighbours, so it is applied after the sampling.
 """
 
 from __future__ import annotations

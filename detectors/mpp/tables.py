@@ -11,7 +11,7 @@ x, h, score
     fit of its roof, in thousandths of a nat.
 
 Whole numbers make sums exact: a rectangle has the same statistics by differences of prefixes as cell by cell, and
-wherever the grid begins. The int32 sums run over 2^32 and begin again. That does no harm: differences are taken modulo
+wherever the grid begins. The int32 sums wrap around at 2^32, which is harmless: differences are taken modulo
 2^32 too, x is counted from a column x0 in the rectangle (sum (x - x0) h = sum x h - x0 sum h, which holds modulo 2^32),
 and the true value fits 32 bits as long as no rectangle reaches over more than `LONGEST` cells:
 |sum (x - x0) h| < 65536 LONGEST^2 / 8 = 2^31.

@@ -1,4 +1,4 @@
-"""Party walls: neighbours that the cells leave a sliver apart, or a sliver over each other, are made to touch.
+"""Party walls: slivers between neighbours, of gap or of overlap, are closed.
 
 The energy is the same wherever an edge lies between two rows of cell centres, so neighbours end up to a cell apart.
 Each edge is moved, by at most a little more than a cell, to where it meets the neighbour: out until contact, or back

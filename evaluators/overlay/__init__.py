@@ -1,1 +1,1 @@
-"""Overlay: what every evaluator stands on. Overlaps, areas, pixels, distances between outlines."""
+"""Overlay, the base of every evaluator: overlaps, areas, pixels, distances between outlines."""

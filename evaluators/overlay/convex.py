@@ -1,6 +1,6 @@
 """Intersection areas of convex quadrilaterals, many pairs at once.
 
-Footprints are mostly rectangles, and general polygon overlay is fifty times dearer than clipping one rectangle by the
+Footprints are mostly rectangles, and general polygon overlay is fifty times slower than clipping one rectangle by the
 four half planes of another. All pairs are clipped together, one half plane at a time.
 """
 

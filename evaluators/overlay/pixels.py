@@ -3,7 +3,7 @@
 A pixel belongs to a footprint when its centre lies inside (Awrangjeb et al. 2010, section 4.2.2). Edges are half open
 (left and upper ones in), so footprints that touch share no pixel and leave none between them.
 
-Nothing is painted: each footprint becomes *spans*, runs of pixels in one row, and all set operations are sweeps over
+No raster is filled: each footprint becomes *spans*, runs of pixels in one row, and all set operations are sweeps over
 span ends sorted by (row, column). Memory grows with the number of spans in a band of rows, not with the extent.
 """
 
@@ -45,7 +45,7 @@ def pixel_areas(
     pairs : tuple of ndarray of int64
         Rows (detections, references) of the TP pairs.
     grid : Grid
-        Its origin and GSD define the lattice, which goes on beyond the image.
+        Its origin and GSD define the lattice, which continues beyond the image.
     false_positives, false_negatives : ndarray of int64
         Rows of the FP detections and of the FN references.
     """

@@ -9,7 +9,7 @@ point spacing
     Typical distance between neighbouring points where there are any: the side of the area that one point has to
     itself, metres.
 
-Nothing of the size of the cloud is made beside it.
+No array of the size of the cloud is made.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ __all__ = ["Statistic", "point_counts", "point_spacing", "spacing_of_counts"]
 _Coordinates = NDArray[np.float64]
 
 #: How the squares are summarised: the *mean* of all covered ones; their *median*, which overlapping flight strips and
-#: half covered borders do not move; or the square of the *median-point*, for points that cover little, as roofs do.
+#: half covered borders do not affect; or the square of the *median-point*, for points that cover little, as roofs do.
 Statistic = Literal["mean", "median", "median-point"]
 
 

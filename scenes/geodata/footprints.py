@@ -133,7 +133,7 @@ class Footprints:
         (2, ['feature 0: Self-intersection[1 1]: repaired', 'feature 1: empty: left out'])
         """
         geometries = _as_geometry_array(polygons)
-        clean, repairs, kept = _mend(geometries)
+        clean, repairs, kept = _repaired(geometries)
         columns = {}
         for name, column in (attributes or {}).items():
             values = column if isinstance(column, np.ndarray) else np.asarray(column)  # keeps the mask of a masked one
@@ -333,7 +333,7 @@ def _as_column(values: Any) -> NDArray[Any]:
     return np.array(items) if plain and items else np.array(items, dtype=object)
 
 
-def _mend(
+def _repaired(
     geometries: NDArray[np.object_],
 ) -> tuple[NDArray[np.object_], tuple[Repair, ...], NDArray[np.bool_]]:
     """Return clean polygons, the repairs, and the mask of rows that were kept."""

@@ -238,7 +238,7 @@ class _Columns:
         keep = np.asarray(chunk.withheld) == 0
         self.withheld += len(keep) - int(np.count_nonzero(keep))
         x, y = np.asarray(chunk.x), np.asarray(chunk.y)
-        # Whole metres, as the extent of a scene is: what a header lacks below that is not lost.
+        # Rounded outwards to whole metres, like the extent of a scene: small errors of a header lose no points.
         low, high = np.floor(bounds[:2]), np.ceil(bounds[3:5])
         inside = (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
         self._outside += int(np.count_nonzero(keep & ~inside))

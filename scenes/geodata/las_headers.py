@@ -48,7 +48,7 @@ def refuse_pointwise(file: Path, header: Any) -> None:
 
 
 def refuse_cut_off(file: Path, header: Any) -> None:
-    """Refuse a file that is shorter than its header says, before records of half a file are believed."""
+    """Refuse a file that is shorter than its header says, before records of half a file are used."""
     needed = header.offset_to_point_data
     if not header.are_points_compressed:
         needed += header.point_count * header.point_format.size

@@ -1,4 +1,4 @@
-"""GeoTIFF files: orthoimages and elevation models read and written, and what is wrong with those of others.
+"""GeoTIFF files: reading, writing and checks of orthoimages and elevation models.
 
 Nouns
 -----

@@ -241,7 +241,7 @@ def _read_ogr(
                 meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0])
             except UnicodeDecodeError:  # text that is not in the encoding which the file names: any byte is a letter
                 meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0], encoding="ISO-8859-1")
-            except ValueError:  # dates that are no day of the calendar: their columns are left out
+            except ValueError:  # dates that do not exist: their columns are left out
                 info = pyogrio.read_info(file, layer=layer or names[0])
                 kept = [
                     name
@@ -283,7 +283,7 @@ def _refuse_cut_off(file: Path) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep GDAL's warnings about what is meant (no CRS, short names, NaN in JSON) from the user."""
+    """Suppress GDAL's warnings about what is intended (no CRS, short names, NaN in JSON)."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

@@ -1,4 +1,4 @@
-"""Bare earth by the cloth simulation filter, from the package that its authors keep (extra ``ground``).
+"""Bare earth by the cloth simulation filter, from the package that its authors maintain (extra ``ground``).
 
 A cloth is laid over the upside-down point cloud; points near it are ground (Zhang et al. 2016, "An easy-to-use airborne
 LiDAR data filtering method based on cloth simulation", Remote Sensing 8(6) 501). It runs on the lowest point of each

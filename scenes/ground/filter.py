@@ -36,7 +36,7 @@ _Mask = NDArray[np.bool_]
 
 #: Size in metres of the blocks whose lowest heights give the trend.
 _TREND_BLOCK = 5.0
-#: Windows up to this radius in metres remove what they remove, walls or not: shrubs and crowns have ragged borders.
+#: Windows up to this radius in metres remove objects without the test for walls: shrubs and crowns have ragged borders.
 _NARROW = 6.0
 #: Gaps of the points wider than twice this, metres, are no surface between what lies around: water, the scene's rim.
 _GAP = 3.0
@@ -217,7 +217,7 @@ def _finite(points: PointCloud) -> tuple[NDArray[np.float64], NDArray[np.float64
 
 
 def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
-    """Return the coarse lie of the land: local planes, fitted to the low parts of a surface, on its grid.
+    """Return the coarse trend of the terrain: local planes, fitted to the low parts of a surface, on its grid.
 
     Locally weighted regression over ever smaller neighbourhoods; what lies above the trend counts less each round, so
     that an object narrower than `largest` (metres) does not lift it. A hill does: its flanks lead up to its top.
@@ -237,7 +237,7 @@ def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
         above = height - trend
         spread = 1.4826 * np.median(np.abs(above[known])) + 0.1
         weight = known / (1 + (np.where(above > 0, 2, 0.5) * above / spread) ** 2)
-    # Planes run away where there is nothing around that they could be fitted to.
+    # Planes are unstable where no data are near.
     trend = fill_unknown(np.where(known, trend, np.nan).astype(np.float32)).astype(np.float64)
     # Samples at the border lie beyond the centres of the outer blocks.
     outer = np.pad(trend, 1, mode="reflect", reflect_type="odd") if min(trend.shape) > 1 else np.pad(trend, 1, "edge")
@@ -291,7 +291,7 @@ def _objects(
             # Narrower windows have taken the trees off: what steps down in the surface between them is a roof.
             walls = _wall_cells(surface, wall_height, cell)
         window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * radius + 1, 2 * radius + 1))
-        # Windows centred beyond hang over: they would hold a roof's rim and nothing else.
+        # Windows centred beyond the border would contain only the rim of a roof.
         lowest = cv2.erode(np.where(beyond, np.float32(np.inf), surface), window)
         opened = cv2.dilate(np.where(beyond, np.float32(-np.inf), lowest), window)
         removed = ~beyond & (surface - opened > np.minimum(0.3 + slope * radius * cell, 2.0))
@@ -299,7 +299,7 @@ def _objects(
             removed = _standing(removed, walls, beyond)
             if feet:
                 removed |= _foot(removed, surface - opened, cell) & ~beyond
-            # The rest of a roof of which a wing is gone stands on the cut, too.
+            # Where a wing of a roof was removed, the border of the rest counts as wall, too.
             walls |= cv2.dilate(removed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         objects |= removed
         surface = np.where(removed, opened, surface)

@@ -5,7 +5,7 @@ Nouns
 lowest surface
     Per cell the lowest point that is not isolated, metres; NaN without one.
 
-A cloud holds more points than its grid has cells, so what is kept beside it is counted in cells: nothing is sorted, and
+A cloud holds more points than its grid has cells, so further arrays have the size of the grid: nothing is sorted, and
 the only array of the points' size holds heights in four bytes each. Axis order of grids: (row, column), row 0
 northernmost.
 """
@@ -142,7 +142,7 @@ def _supported(
 def mean_above(
     x: _Coordinates, y: _Coordinates, z: _Coordinates, surface: Elevation, *, tolerance: float
 ) -> NDArray[np.float32]:
-    """Return how high the points near a surface lie above it in the mean of each of its cells, metres; NaN without one.
+    """Return the mean height above a surface of the points near it, per cell, metres; NaN without one.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def outlines_of_class(
     outlines = simplify(_without_small_holes(traced, minimum_area / 4), _TOLERANCE * grid.gsd)
     if len(outlines):
         outlines = outlines[shapely.area(outlines) >= minimum_area]
-    # From north to south, west to east, so that the numbering reads like a page.
+    # From north to south, west to east, so that numbers follow the order of reading.
     bounds = shapely.bounds(outlines).reshape(-1, 4)
     return Footprints.of(outlines[np.lexsort((bounds[:, 0], -bounds[:, 3]))], crs=crs, source=source)
 

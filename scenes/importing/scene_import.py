@@ -1,4 +1,4 @@
-"""Import: a scene folder from the files that people have.
+"""Import: a scene folder from files in common formats.
 
 Point files, orthoimages, an elevation model, footprints and an evaluation area, each in its own file format, cell size
 and perhaps CRS, are brought to one CRS and one extent (`placing`). A layer that is absent can be derived: the DEM from

@@ -1,7 +1,7 @@
-"""The synthetic scene generator: terrain, streets, buildings, trees, and how laser and camera see them.
+"""The synthetic scene generator: terrain, streets, buildings, trees, and the simulated laser scanner and camera.
 
 From truth to measurement: `recipe` (parameters) and `streams` (random numbers) -> `layout`, `terrain`, `buildings`,
-`vegetation`, `clutter` -> `world` -> `lidar`, `orthoimage` (by way of `surface`, `lighting`), `survey` (the DEM),
+`vegetation`, `clutter` -> `world` -> `lidar`, `orthoimage` (through `surface`, `lighting`), `survey` (the DEM),
 `reference`. `make` puts them into a `Scene`, `presets` names recipes.
 """
 

@@ -1,6 +1,6 @@
 """Buildings on their parcels, put together from rectangles that overlap as the papers' references do.
 
-Every parcel has its own row of random draws, so that a knob changes what it names and nothing else.
+Every parcel has its own row of random draws, so that changing one parameter leaves everything else as it is.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Town:
 def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) -> Town:
     """Build exactly as many buildings or entities as the recipe says, sites in the order of their mark.
 
-    Where entities are counted, the last building has as many parts as are still to come.
+    Where entities are counted, the last building has only as many parts as are still missing.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
 
 
 def _within_quota(building: list[Solid], quota: int, counted: str) -> tuple[list[Solid], int]:
-    """Return the parts of a building that a quota leaves room for, from its first one on, and what they count."""
+    """Return the first parts of a building, as many as the quota allows, and what they count."""
     if quota == 0:
         return [], 0
     if counted == "buildings":
@@ -123,14 +123,14 @@ def _within_quota(building: list[Solid], quota: int, counted: str) -> tuple[list
 
 
 class _Taken:
-    """The ground that buildings stand on: where streets wind, parcels of two streets can reach into each other."""
+    """Ground taken by buildings: where streets wind, parcels of two streets can overlap."""
 
     def __init__(self, room: int) -> None:
         self._circles = np.empty((room, 3))
         self._outlines: list[shapely.Polygon] = []
 
     def add(self, building: list[Solid]) -> None:
-        """Take the ground below the parts of a building."""
+        """Add the ground below the parts of a building."""
         for part in building:
             self._circles[len(self._outlines)] = part.x, part.y, math.hypot(part.length, part.width) / 2
             self._outlines.append(shapely.Polygon(part.corners()))

@@ -1,4 +1,4 @@
-"""Clutter: the low things between houses that disturb a height threshold, and what covers the ground there.
+"""Clutter: low objects between houses that disturb a height threshold, and the ground covers there.
 
 Cars, hedges, fences, pools, small sheds and carports: none is in the reference, because each stays below 2.5 m or
 10 m2. Ground *patches* (driveways, patios, pools, yards) have no height.
@@ -85,7 +85,7 @@ def scatter(
 
 
 def _clear_of_buildings(things: list[Solid], buildings: Sequence[Solid]) -> list[Solid]:
-    """Return the things that stand in no building, tested at points along their axis."""
+    """Return the objects outside all buildings, tested at points along their axis."""
     steps = [max(2, math.ceil(thing.length / 2) + 1) for thing in things]
     starts = np.cumsum([0, *steps])[:-1]
     x, y = np.empty(sum(steps)), np.empty(sum(steps))

@@ -2,7 +2,7 @@
 
 An *entity* is one rectangle of the reference: an I-shaped building is one, an L two, a U three, a C four. The parts of
 one building overlap as they were built, which is the *natural overlap* of the papers. A part that lies inside another
-part of its building (a tower on its podium) is not an outline of its own.
+part of its building (a tower on its podium) has no separate outline.
 
 Source: Awrangjeb, Ravanbakhsh & Fraser (2010), sections 4.1 and 4.3.
 """
@@ -20,7 +20,7 @@ from .solids import Solid
 
 __all__ = ["LOWEST", "SMALLEST", "count_entities", "entities"]
 
-#: Least area, m2, and least height, m, of what the reference holds.
+#: Least area, m2, and least height, m, of an entity in the reference.
 SMALLEST, LOWEST = 10.0, 2.5
 _WITHIN = 0.9
 

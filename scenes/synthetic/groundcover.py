@@ -130,7 +130,7 @@ def _street_code(main: float, street: float, side: float, cross: float, zone: in
 
 @kernel
 def _parcel_number(block: int, row: int, along: float, across: float, pattern: NDArray[np.float64], zone: int) -> int:
-    """Return a number of the parcel that no other parcel near has; a park is one parcel."""
+    """Return a number of the parcel that differs from those of nearby parcels; a park is one parcel."""
     usable = pattern[1] - pattern[3]
     wide = pattern[7] * (HALL_WIDTH if zone == HALLS else 1.0)
     count = max(1, round(usable / wide))

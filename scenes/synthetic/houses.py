@@ -39,7 +39,7 @@ def _pitched(draws: Draws, recipe: SceneParameters) -> tuple[Roof, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class _Plan:
-    """Where a house stands in its parcel: centre along the street, front, sides, which way it looks, roof."""
+    """Where a house stands in its parcel: centre along the street, front, sides, orientation, roof."""
 
     a: float
     front: float
@@ -115,7 +115,7 @@ def _compose_plan(plan: _Plan, parcel: Parcel, recipe: SceneParameters, draws: D
 
 
 def _outbuildings(parcel: Parcel, recipe: SceneParameters, draws: Draws, rear: float, mirror: float) -> Iterator[Solid]:
-    """Yield garages and sheds behind a house that ends at `rear`, on the other side from where it stands."""
+    """Yield garages and sheds behind a house that ends at `rear`, on the side away from the house."""
     size, count = recipe.building_size, recipe.outbuildings
     for rank in range(2):
         wanted, car, corner = parcel.even[1] < count - rank, draws.chance(0.62 if rank == 0 else 0.3), draws.unit()

@@ -161,7 +161,7 @@ def _zones(layout: Layout, recipe: SceneParameters, seed: int) -> NDArray[np.uin
     x, y = x / recipe.width, y / recipe.height
     area = _areas(layout, recipe)
     towards = (x * direction[0] + y * direction[1]) / np.hypot(*direction) + 0.12 * noise
-    # A block that the border cuts off shows no hall: take whole ones first.
+    # A block cut by the border shows no hall: prefer whole ones.
     towards += 10.0 * (area < 0.7 * layout.pattern[0] * layout.pattern[1])
     away = np.hypot(x - core[0], y - core[1]) + 0.10 * noise
     zones = np.full(shape, TOWERS if recipe.zone == "towers" else HOUSES, dtype=np.uint8)
@@ -184,7 +184,7 @@ def _areas(layout: Layout, recipe: SceneParameters) -> NDArray[np.float64]:
 
 
 def _lowest(values: NDArray[np.float64], area: NDArray[np.float64], share: float) -> NDArray[np.bool_]:
-    """Return the blocks of lowest values, as many as cover a share of the extent most nearly."""
+    """Return the blocks of lowest values, as many as come nearest to a share of the extent."""
     order = np.argsort(values, axis=None, kind="stable")
     covered = np.concatenate([[0.0], np.cumsum(area.ravel()[order])])
     count = int(np.argmin(np.abs(covered - share * covered[-1])))

@@ -1,16 +1,16 @@
-"""The laser scanner: pulses in scan lines, cut with solids and crowns, and what comes back.
+"""The laser scanner: pulses in scan lines, their intersections with solids and crowns, and the returns.
 
 Nouns
 -----
 strip
-    What one flight line sees; neighbouring strips overlap, so the point density differs from place to place.
+    The swath of one flight line; neighbouring strips overlap, so the point density differs from place to place.
 pulse
-    A ray through a place on the bare earth, tilted towards the flight line: seen from there, walls facing the aircraft
-    return points, and the ground behind a building none.
+    A ray through a place on the bare earth, tilted towards the flight line: walls facing the aircraft return points,
+    the ground behind a building returns none.
 footprint
     A pulse is some decimetres wide: at an edge, part of it hits the roof and the rest the ground.
 
-In a crown a pulse loses energy with the length of its way through leaves (Beer-Lambert): the optical depth until the
+In a crown a pulse loses energy along its path through leaves (Beer-Lambert): the optical depth until the
 next return is exponentially distributed. Returns closer than the receiver's dead zone are one.
 """
 
@@ -127,12 +127,12 @@ def _pulses(recipe: SceneParameters, seed: int) -> NDArray[np.float64]:
 def _strips_over(
     recipe: SceneParameters, heading: tuple[float, float], half: float, between: float, phase: float
 ) -> float:
-    """Return by how many strips a place in the extent is seen, on average."""
+    """Return the mean number of strips that cover a place in the extent."""
     x, y = ((np.arange(80) + 0.5) / 80 - 0.5) * recipe.width, ((np.arange(80) + 0.5) / 80 - 0.5) * recipe.height
     q = heading[0] * y[:, None] - heading[1] * x[None, :]
     number = q / between + phase
     offset = np.abs(number - np.round(number)) * between
-    # The nearest strip always sees the place; the second nearest does within its half width.
+    # The nearest strip always covers the place, the second nearest within its half width.
     return float((1.0 + (between - offset < half)).mean())
 
 
@@ -144,7 +144,7 @@ def _strip(
     extent: tuple[float, float],
     key: int,
 ) -> NDArray[np.float64]:
-    """Return the pulses of one strip: lines across the flight, a little uneven as mirror and aircraft are."""
+    """Return the pulses of one strip: lines across the flight, slightly irregular, like mirror and aircraft."""
     low, high, middle, half, reach = span
     spacing, phase, tangent = rhythm
     cosine, sine, cx, cy = frame
@@ -154,7 +154,7 @@ def _strip(
     out = np.empty((lines * dots, 4))
     count = 0
     for i in range(lines):
-        # Aircraft and mirror speed vary slowly: lines and pulses crowd here and thin out there.
+        # Aircraft and mirror speed vary slowly, and with them the density of lines and pulses.
         drift = 5.5 * math.sin(i * along_step / 37.0 + 6.0 * phase) / along_step + 0.12 * gauss(key, i)
         for k in range(dots):
             counter = (i * dots + k) * 2 + (1 << 40)
@@ -255,7 +255,7 @@ def _solid_top(ray: _Ray, cells: CellLists, planes: NDArray[np.float64]) -> tupl
                 if high > low and high > best:
                     best, hit, where = high, k, face
         previous = cell
-        # Go on along the path for as long as something as tall may stand there.
+        # Continue along the path while an object may be that tall.
         height += 2.0 / max(lean, 1e-6)
         if ground + height > highest:
             break
@@ -266,7 +266,7 @@ def _solid_top(ray: _Ray, cells: CellLists, planes: NDArray[np.float64]) -> tupl
 def _leaf_hits(
     ray: _Ray, floor: float, cells: CellLists, blobs: NDArray[np.float64], found: NDArray[np.float64]
 ) -> int:
-    """Collect the ways through blobs above `floor` (heights above ground: entry, exit, blob); return how many."""
+    """Collect the paths through blobs above `floor` (heights above ground: entry, exit, blob); return how many."""
     x, y, ground, tx, ty = ray
     start, items, top, highest, size_x, size_y = cells
     count, height, previous = 0, 0.0, -1
@@ -332,7 +332,7 @@ def _scan_chunk(
         ray = _Ray(x, y, level, tx, ty)
         height, hit, face = _solid_top(ray, standing.cells, standing.planes)
         echoes, length = _crown_echoes(ray, height, leaves, found, echo, key, counter)
-        # What a crown has not taken reaches the roof or the ground below it.
+        # Energy that a crown has not absorbed reaches the roof or the ground below.
         if echoes == 0 or uniform(key, counter + 7) < math.exp(-_OPAQUE * length):
             row = min(int((cover.north - y) / cover.gsd), codes.shape[0] - 1)
             column = min(int((x - cover.west) / cover.gsd), codes.shape[1] - 1)
@@ -400,7 +400,7 @@ def _crown_echoes(
     key: np.uint64,
     counter: int,
 ) -> tuple[int, float]:
-    """Fill `echo` with the returns of leaves, the highest first; return how many, and the length of way in leaves."""
+    """Fill `echo` with the returns of leaves, the highest first; return how many, and the path length in leaves."""
     ways = _leaf_hits(ray, floor, leaves.cells, leaves.blobs, found)
     echoes, length = 0, 0.0
     reached = 1e9

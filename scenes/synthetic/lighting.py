@@ -58,7 +58,7 @@ def sunlit(surface: Surface, recipe: SceneParameters) -> NDArray[np.bool_]:
 
 @kernel
 def _sweep(z: NDArray[np.float32], lit: NDArray[np.bool_], downwards: bool, slant: float, drop: float) -> None:
-    """Walk rows in the direction of the shadows; each slanted line remembers how high its shadow still is."""
+    """Walk rows in the direction of the shadows; each slanted line keeps the present height of its shadow."""
     rows, columns = z.shape
     base = int(abs(slant) * rows) + 2
     front = np.full(columns + 2 * base, -1e9)
@@ -259,7 +259,7 @@ def _solid_albedo(albedo: NDArray[np.float64], k: int, face: int, spot: _Spot, r
     if body[k] == _HEDGE:
         factor += 0.16 * grain
         direct = 0.85 + 0.2 * grain
-    # Each face weathers in its own way.
+    # Each face has a different weathering.
     factor += 0.05 * (uniform(np.uint64(977), k * 8 + face) - 0.5)
     for b in range(4):
         albedo[b] = colour[k, b] * factor

@@ -59,7 +59,7 @@ def _half_gaussian(sigma: float) -> NDArray[np.float32]:
 
 @kernel
 def _block_tops(z: NDArray[np.float32], label: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the highest thing in each block of the image; far below everything where the ground is bare."""
+    """Return the highest elevation in each block of the image; far below everything where the ground is bare."""
     tops = np.full(((z.shape[0] + _BLOCK - 1) // _BLOCK, (z.shape[1] + _BLOCK - 1) // _BLOCK), -1e9)
     for r in range(z.shape[0]):
         for c in range(z.shape[1]):
@@ -203,7 +203,7 @@ def _lean(
                 above = z[pi, pj] - ground - height
                 if above >= -0.05 or k == 0:
                     i, j = pi, pj
-                    # Deep below the top where the ray meets the surface: it came in through the side.
+                    # Deep below the top where the ray meets the surface: it entered through the side.
                     if k < count and above > step + 0.6:
                         side = ground + height
                     break
@@ -235,12 +235,12 @@ def _wall(out: NDArray[np.uint8], k: int, level: float, ray: _Ray, walls: _Walls
 
 @kernel
 def _expose(values: NDArray[np.uint8], spread: NDArray[np.float32], noise: float, key: np.uint64) -> NDArray[np.uint8]:
-    """Blur by the point spread and add noise that is the same for no two cells nor bands."""
+    """Blur by the point spread and add noise that is independent for all cells and bands."""
     bands, rows, columns = values.shape
     out = np.empty_like(values)
     half = len(spread) - 1
     line = np.empty(columns, dtype=np.float32)
-    # Each row of each band reads the same long strip of noise from a place of its own.
+    # Each row of each band reads the same long strip of noise from a different start.
     grain = np.empty(_NOISE, dtype=np.float32)
     for k in range(_NOISE):
         grain[k] = noise * 255.0 * gauss(key, k)

@@ -1,4 +1,4 @@
-"""Parcels: where buildings may stand, which way they look and in which order they are built on.
+"""Parcels: where buildings may stand, their orientation, and the order in which they are built on.
 
 A *site* is a parcel on which one house, hall or tower may stand; its *front* faces the street. Parcel coordinates: a
 along the street, b from the front towards the back, metres, origin in the parcel's centre.

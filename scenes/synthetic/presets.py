@@ -214,7 +214,7 @@ _VAIHINGEN: dict[str, Any] = {
     "horizontal_noise": 0.08,
 }
 
-#: A part of Fairfield is as flat as a part of it is.
+#: The three parts of Fairfield have a smaller range of heights than the whole.
 _PART = _FAIRFIELD | {"undulation": 4}
 
 _FULL: Mapping[str, dict[str, Any]] = {
@@ -274,7 +274,7 @@ def preset(name: str, **changes: Any) -> SceneParameters:
     values = dict(_FULL[full])
     if name != full:
         side, buildings = _SMALL[full]
-        # Relief belongs to a landscape, of which a small scene sees a part.
+        # A small scene shows only a part of the relief.
         values["undulation"] *= side / max(values["width"], values["height"])
         values |= {"width": side, "height": side, "buildings": buildings}
         # Too small for a block of another use, and for the whole hall of one.

@@ -1,4 +1,4 @@
-"""The parameters of a synthetic scene: with a seed, all that there is to know about it.
+"""The parameters of a synthetic scene: with a seed they define it completely.
 
 Nouns
 -----
@@ -37,7 +37,7 @@ class SceneParameters(Parameterised):
 
     width: float = parameter(250.0, unit="m", minimum=40, maximum=2000, doc="extent from west to east")
     height: float = parameter(250.0, unit="m", minimum=40, maximum=2000, doc="extent from south to north")
-    epsg: int = parameter(32756, minimum=1024, maximum=998999, doc="projected CRS that the scene pretends to lie in")
+    epsg: int = parameter(32756, minimum=1024, maximum=998999, doc="projected CRS of the scene")
 
     elevation: float = parameter(20.0, unit="m", minimum=-500, maximum=5000, doc="lowest natural ground")
     slope: float = parameter(1.0, unit="deg", minimum=0, maximum=40, doc="dip of the plane below the relief")
@@ -47,7 +47,7 @@ class SceneParameters(Parameterised):
         unit="m",
         minimum=0,
         maximum=200,
-        doc="height range of the relief; it adds to that of the plane as legs of a right triangle",
+        doc="height range of the relief; its square adds to that of the plane",
     )
     terracing: float = parameter(0.8, minimum=0, maximum=1, doc="how far the ground under a building is levelled")
 

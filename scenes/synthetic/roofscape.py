@@ -1,6 +1,6 @@
-"""What stands on roofs: chimneys, dormers, solar panels, skylights, plant rooms, air conditioners.
+"""Roof structures: chimneys, dormers, solar panels, skylights, plant rooms, air conditioners.
 
-It roughens roofs for the laser and draws lines in the image; the reference does not know it.
+They make roofs rough for the laser and add lines to the image; the reference ignores them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Solids: everything with straight edges, as convex bodies that rays and rasters can be cut with.
+"""Solids: everything with straight edges, as convex bodies that rays and rasters can be intersected with.
 
 Nouns
 -----
@@ -58,7 +58,7 @@ class Texture(enum.IntEnum):
 
 @dataclass
 class Solid:
-    """One solid while a scene is being put together.
+    """One solid during the construction of a scene.
 
     Attributes
     ----------

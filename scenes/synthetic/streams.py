@@ -1,4 +1,4 @@
-"""Random streams of the generator: one per part of the scene, so that turning one knob leaves the rest in place.
+"""Random streams of the generator: one per part of the scene, so that changing one parameter leaves the rest in place.
 
 Nouns
 -----

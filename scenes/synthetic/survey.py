@@ -1,9 +1,9 @@
-"""The DEM that is handed out: what an airborne survey makes of the bare earth.
+"""The DEM of a scene: the bare earth as an airborne survey would give it.
 
 A ground filter leaves points on open ground only. Below buildings, cars and hedges there are none, below crowns few;
-the DEM is interpolated over those gaps and smoothed over the spacing of the points left. So it includes the pad that a
-house on a slope stands on only by its rim, and blurs the edges of terraces and retaining walls, while the error on open
-ground is small.
+the DEM is interpolated over those gaps and smoothed over the spacing of the points left. So of the pad below a house on
+a slope it shows only the rim, and it blurs the edges of terraces and retaining walls, while the error on open ground is
+small.
 
 Its error is that of every height model on a slope: sigma_z = a + b tan(slope) (Koppe's formula), where a is the
 vertical error on level ground and b the horizontal one, which is several times as large (Hodgson & Bresnahan 2004,

@@ -23,7 +23,7 @@ _FADE = 5.0
 
 
 def natural_terrain(recipe: SceneParameters, seed: int) -> Elevation:
-    """Return the ground before anyone built on it, on a 1 m raster with a margin."""
+    """Return the ground before construction, on a 1 m raster with a margin."""
     grid = Grid.covering((-_MARGIN, -_MARGIN, recipe.width + _MARGIN, recipe.height + _MARGIN), 1.0)
     x, y = grid.to_world(np.arange(grid.rows)[:, None] + 0.5, np.arange(grid.columns)[None, :] + 0.5)
     relief = fractal_field(stream(seed, "terrain"), grid.shape, grid.gsd, (260.0, 130.0, 60.0, 25.0), 0.42)
@@ -55,7 +55,8 @@ def _fitted_plane(
 def _amplitude(plane: NDArray[np.float64], relief: NDArray[np.float64], undulation: float) -> float:
     """Return the factor on the relief with which the ground spans what plane and undulation span together.
 
-    The two add up like the legs of a right triangle, whatever the seed: a hilly preset has its printed elevations.
+    The two ranges add up as the root of the sum of squares, whatever the seed: a hilly preset has its printed
+    elevations.
     """
     target = float(np.hypot(np.ptp(plane), undulation))
     low, high = 0.0, (target + float(np.ptp(plane))) / max(float(np.ptp(relief)), 1e-9)

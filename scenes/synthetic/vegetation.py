@@ -1,4 +1,4 @@
-"""Trees: where they stand and what their crowns are made of.
+"""Trees: their positions and crowns.
 
 Nouns
 -----
@@ -6,8 +6,8 @@ candidate
     A place where a tree may grow, with a *mark* and all its properties. Candidates are drawn for the highest possible
     density; a scene keeps the allowed ones with the lowest marks, so the trees at 20 per hectare are among those at 40.
 crown
-    A heap of ellipsoids (*blobs*): a core and a dozen lobes around its upper side, so that outlines are ragged, heights
-    vary within a crown and light finds its way through.
+    A cluster of ellipsoids (*blobs*): a core and a dozen lobes around its upper side, so that outlines are ragged,
+    heights vary within a crown and light passes through.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def _crowns(
     recipe: SceneParameters,
     seed: int,
 ) -> Trees:
-    """Give the trees that stand their height, colour and blobs."""
+    """Give the accepted trees their height, colour and blobs."""
     count = math.ceil(MOST_TREES * recipe.hectares)
     rng = stream(seed, "crowns")
     looks = rng.random((count, 8))[candidate]
@@ -226,7 +226,7 @@ def _needled(
     radius: NDArray[np.float64],
     lobes: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return blobs of conifers: a cone of ever narrower whorls."""
+    """Return blobs of conifers: a cone of whorls, narrower towards the top."""
     blobs = np.empty((len(x), _LOBES + 1, 5))
     whorl = height / (_LOBES + 1)
     for k in range(_LOBES + 1):

@@ -1,4 +1,4 @@
-"""The world of a scene: the truth that measurements are taken of.
+"""The world of a scene: the true state that the simulated sensors measure.
 
 Local world coordinates: x east, y north from the lower left corner of the extent, metres; z is elevation.
 """
@@ -26,7 +26,7 @@ from .vegetation import Trees, grow
 __all__ = ["CellIndex", "CellLists", "Relief", "World", "ground_at", "make_world"]
 
 _CELL = 4.0
-#: Objects are listed in the cells within this distance, so that a path sampled every 2 m cannot slip past one.
+#: Objects are listed in the cells within this distance, so that a path sampled every 2 m cannot miss one.
 _REACH = 1.1
 
 
@@ -57,7 +57,7 @@ class World:
 
 
 def make_world(recipe: SceneParameters, seed: int) -> World:
-    """Grow and build the world of a recipe and a seed."""
+    """Return the world of a recipe and a seed."""
     ground = natural_terrain(recipe, seed)
     layout = plan_layout(recipe, seed)
     sites = plan_sites(layout, recipe, seed)
