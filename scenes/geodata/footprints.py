@@ -247,7 +247,8 @@ class Footprints:
         """Start of each footprint in the rows of points, shape (n + 1,), and points, shape (m, 2), metres.
 
         The rings of a footprint are closed and follow each other, separated by a row of NaN. Where there are several,
-        exteriors run counter-clockwise and holes clockwise; a single one runs as it was given.
+        exteriors run counter-clockwise and holes clockwise; a single one runs as it was given. An empty polygon, which
+        clipping may leave, has no points.
         """
         single = (shapely.get_type_id(self.polygons) == 3) & (shapely.get_num_interior_rings(self.polygons) == 0)
         counts = shapely.get_num_coordinates(self.polygons).astype(np.int64)
@@ -258,7 +259,8 @@ class Footprints:
         gap = np.full((1, 2), np.nan)
         for row in np.flatnonzero(~single).tolist():
             rings = shapely.get_rings(shapely.get_parts(shapely.orient_polygons(self.polygons[row])))
-            several[row] = np.concatenate([part for ring in rings for part in (gap, shapely.get_coordinates(ring))][1:])
+            pieces = [part for ring in rings for part in (gap, shapely.get_coordinates(ring))]
+            several[row] = np.concatenate(pieces[1:]) if pieces else np.empty((0, 2))
             counts[row] = len(several[row])
         start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         points = np.empty((start[-1], 2))

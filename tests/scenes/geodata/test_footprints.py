@@ -156,3 +156,10 @@ def test_the_centre_of_a_rectangle_is_found_anywhere(middle, angle, length, widt
     footprints = rb.Footprints.from_rectangles(corners)
     np.testing.assert_allclose(footprints.centres[0], middle, atol=1e-6)
     assert footprints.areas[0] == pytest.approx(length * width, rel=1e-6)
+
+
+def test_rings_of_what_clipping_leaves_empty_have_no_points():
+    clipped = np.array([shapely.box(0, 0, 1, 1), shapely.MultiPolygon(), shapely.Polygon(), shapely.box(5, 5, 6, 6)])
+    start, points = rb.Footprints(clipped).rings
+    assert start.tolist() == [0, 5, 5, 5, 10]
+    assert np.isfinite(points).all()
