@@ -124,6 +124,8 @@ class MPP(MPPParameters, Detector):
             "seed": seed,
             "cell": prepared.grid.gsd,
             "background": {key: value for key, value in asdict(prepared.background).items() if key != "evidence"},
+            "cues": list(prepared.cues.used),
+            "notes": list(prepared.cues.notes),
             "boxes": len(prepared.boxes),
             "energy": total_energy(prepared, rectangles, energies),
             "trace": join_traces(results),

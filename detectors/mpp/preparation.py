@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from ...core.errors import ParameterError
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
+from ..shared.cue_information import CueInformation
 from .annealing import Boxes
 from .arrays import Heights, Mask, Rectangles, Scores, States
 from .background import Background, estimate_background
@@ -24,6 +26,7 @@ from .cells import cell_size, make_cells
 from .energy import Model, rectangle_energies
 from .memory import release_memory
 from .parameters import MPPParameters
+from .return_numbers import MULTIPLE, cues_of
 from .scores import Weights, fitted_cells, score_cells
 from .superstructures import lower_superstructures
 from .tables import LONGEST, TALLEST, Tables, make_tables
@@ -60,6 +63,8 @@ class Prepared:
         `tables.NO_TABLES` after use.
     model : Model
     boxes : Boxes
+    cues : CueInformation
+        Which cues the evidence is made of.
     """
 
     grid: Grid
@@ -70,6 +75,7 @@ class Prepared:
     tables: Tables
     model: Model
     boxes: Boxes
+    cues: CueInformation
 
 
 def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads: Threads) -> Prepared:
@@ -81,7 +87,7 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
             f"not reach over more than {LONGEST} cells: lower it to {math.floor(LONGEST * cell / math.sqrt(2))}, "
             f"or raise cell"
         )
-    background, height, state, score, fitted = _classes(parameters, points, scene, cell, threads)
+    background, height, state, score, fitted, cues = _classes(parameters, points, scene, cell, threads)
     least = math.ceil(_SMALLEST_BOX / cell**2)
     boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, threads=threads)
     kept = _shortened(height, threads)
@@ -89,7 +95,7 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
     release_memory()
     tables = make_tables(kept, fitted, score, threads=threads)
     model, grid = _model(parameters, cell), Grid.covering(scene.extent, cell)
-    return Prepared(grid, kept, state, score, background, tables, model, _rated(boxes, tables, model, threads))
+    return Prepared(grid, kept, state, score, background, tables, model, _rated(boxes, tables, model, threads), cues)
 
 
 def _rated(rectangles: Rectangles, tables: Tables, model: Model, threads: Threads) -> Boxes:
@@ -114,13 +120,27 @@ def _shortened(height: Heights, threads: Threads) -> NDArray[np.uint16]:
     return short
 
 
-def _classes(
-    parameters: MPPParameters, points: PointCloud, scene: Scene, cell: float, threads: Threads
-) -> tuple[Background, Heights, States, Scores, Mask]:
+class _Classes(NamedTuple):
+    """Classes of a scene, and what they make of its cells; attributes as in `Prepared`."""
+
+    background: Background
+    height: Heights
+    state: States
+    score: Scores
+    fitted: Mask
+    cues: CueInformation
+
+
+def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: float, threads: Threads) -> _Classes:
     """Return the classes of the scene, and height, state, score and whether it is fitted of each cell."""
     low = _LOW_SHARE * parameters.least_height
-    cells = make_cells(points, scene.heights.ground, Grid.covering(scene.extent, cell), low=low, threads=threads)
+    grid, ground = Grid.covering(scene.extent, cell), scene.heights.ground
+    cells = make_cells(points, ground, grid, low=low, threads=threads)
     background, bins = estimate_background(cells, threads=threads)
+    cues = cues_of(points, bins)
+    if MULTIPLE in cues.silent:
+        cells = make_cells(replace(points, number_of_returns=None), ground, grid, low=low, threads=threads)
+        background, bins = estimate_background(cells, threads=threads)
     weights = weights_of(parameters)
     fitted = fitted_cells(cells, bins, background, weights, threads=threads)
     if parameters.carried_share <= 1:
@@ -137,7 +157,7 @@ def _classes(
         bins = textures(cells.height, cells.state, cells.openness, threads=threads)
         fitted = fitted_cells(cells, bins, background, weights, threads=threads)
     score = score_cells(cells, bins, background, weights, threads=threads)
-    return background, cells.height, cells.state, score, fitted
+    return _Classes(background, cells.height, cells.state, score, fitted, cues)
 
 
 def weights_of(parameters: MPPParameters) -> Weights:

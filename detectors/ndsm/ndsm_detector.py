@@ -30,6 +30,7 @@ from ...scenes.geodata.raster import Grid
 from ...scenes.ground.heights import Heights, heights_of
 from ...scenes.scene import Scene
 from ..base import Detector
+from ..shared.cue_information import ANCHOR, CueInformation, informative_cues
 from ..shared.cues import CellCues, cell_cues, greenness
 from ..shared.morphology import opened, without_holes
 from ..shared.regularise import regularise
@@ -45,6 +46,8 @@ _Mask = NDArray[np.bool_]
 #: Name of the cue from the image, and its weight against 1 for each cue from the points: roofs may be green, trees in
 #: autumn are not, and roofs are displaced in the image.
 _IMAGE, _IMAGE_WEIGHT = "image vegetation", 0.5
+#: Noise of heights, metres, that the threshold of roughness allows for; image matching may have more.
+_LASER_NOISE = 0.12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +146,9 @@ class NDSM(Detector):
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
         high = np.nan_to_num(cues.high_share) >= 0.5
-        cue_likeness = self._cue_likeness(cues, self._vegetation(scene, grid))
+        rated = self._cue_likeness(cues, self._vegetation(scene, grid))
+        information = informative_cues(rated, high)
+        cue_likeness = {name: rated[name] for name in information.used}
         likeness = _averaged(_mean_of(cue_likeness, grid.shape), high, self.smoothing / grid.gsd)
         roof = high & ((likeness < 0) | np.isnan(likeness))
         mask = self._clean(roof, grid.gsd)
@@ -156,7 +161,7 @@ class NDSM(Detector):
             roof=roof,
             mask=mask,
             traced=traced,
-            footprints=self._footprints(traced, cues, likeness, scene.crs),
+            footprints=self._footprints(traced, cues, likeness, scene.crs, information),
         )
 
     def measured(self, scene: Scene) -> Mapping[str, float]:
@@ -183,7 +188,7 @@ class NDSM(Detector):
         index, least_index = vegetation or (None, None)
         rules = {
             "multiple returns": (cues.multiple_share, self.multiple_share, 0.25),
-            "roughness": (cues.roughness, self.roughness, 0.2),
+            ANCHOR: (cues.roughness, self._roughest_roof(cues.noise), 0.2),
             "penetration": (cues.penetration, self.penetration, 0.15),
             _IMAGE: (index, least_index, 0.05),
         }
@@ -193,12 +198,21 @@ class NDSM(Detector):
             if value is not None and threshold is not None
         }
 
+    def _roughest_roof(self, noise: float) -> float | None:
+        """Return the threshold of roughness, raised by what the noise of the cloud exceeds that of laser scanners."""
+        return None if self.roughness is None else self.roughness + max(noise - _LASER_NOISE, 0.0)
+
     def _clean(self, roof: _Mask, cell: float) -> _Mask:
         """Fill small holes and open."""
         return opened(without_holes(roof, self.largest_hole / cell**2), self.opening / cell)
 
     def _footprints(
-        self, traced: NDArray[np.object_], cues: CellCues, likeness: _Floats, crs: str | None
+        self,
+        traced: NDArray[np.object_],
+        cues: CellCues,
+        likeness: _Floats,
+        crs: str | None,
+        information: CueInformation,
     ) -> Footprints:
         height, looks = _means_inside(traced, cues.grid, cues.height, likeness)
         if self.outline == "rectangle":
@@ -209,7 +223,8 @@ class NDSM(Detector):
         # Without any cue the mean is NaN and the footprint is kept.
         keep = ~(looks > self.most_tree_like) & (shapely.area(polygons) >= self.smallest_area)
         attributes = {"height": height[keep], "tree_likeness": looks[keep]}
-        return Footprints.of(polygons[keep], crs=crs, attributes=attributes, source=self.name)
+        record = {"cues": list(information.used), "notes": list(information.notes)}
+        return Footprints.of(polygons[keep], crs=crs, attributes=attributes, metadata=record, source=self.name)
 
 
 def default_cell(points: PointCloud, heights: NDArray[np.float32], extent: tuple[float, float, float, float]) -> float:

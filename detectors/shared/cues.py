@@ -39,6 +39,8 @@ _NEIGHBOURS = 3
 _LEAST_POINTS = 6
 #: Least ratio of the spread of the points in two directions (determinant over squared mean of their covariance).
 _FLATTEST = 1e-3
+#: Metres: side of the blocks in which the noise of low points is estimated, and height below which a point is low.
+_BLOCK, _GROUND = 2.0, 1.0
 #: Cells of a strip.
 _STRIP = 1_000_000
 #: Deviation where there is no plane: larger than any real one.
@@ -64,6 +66,9 @@ class CellCues:
         Metres; NaN where too few points are high.
     height : ndarray
         Mean height of the high points, metres; NaN without.
+    noise : float
+        Standard deviation of the heights of low points within `_BLOCK` metres, median, metres; 0 where too few are near
+        each other.
     """
 
     grid: Grid
@@ -73,6 +78,7 @@ class CellCues:
     multiple_share: _Floats | None
     roughness: _Floats
     height: _Floats
+    noise: float = 0.0
 
 
 def cell_cues(
@@ -114,7 +120,23 @@ def cell_cues(
         multiple_share=multiple_share,
         roughness=np.where((smoothest < _NO_PLANE) & (n_high > 0), smoothest, np.float32(np.nan)),
         height=_share(_on_grid(sums, grid), n_high),
+        noise=_noise(points, heights, used, grid),
     )
+
+
+def _noise(points: PointCloud, heights: NDArray[np.float32], used: NDArray[np.intp], grid: Grid) -> float:
+    """Return the noise of the heights of low points, metres; see `CellCues`."""
+    low = used[heights[used] < _GROUND]
+    blocks = Grid.covering(grid.extent, max(_BLOCK, grid.gsd))
+    index, _ = blocks.cells(points.x[low], points.y[low])
+    size, h = blocks.rows * blocks.columns, heights[low].astype(np.float64)
+    count = np.bincount(index, minlength=size)
+    several = count >= _LEAST_POINTS
+    if not several.any():
+        return 0.0
+    n, mean = count[several], np.bincount(index, weights=h, minlength=size)[several] / count[several]
+    squares = np.bincount(index, weights=h * h, minlength=size)[several] / n
+    return float(np.median(np.sqrt(np.maximum(squares - mean**2, 0) * n / (n - 1))))
 
 
 def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -89,6 +91,31 @@ def test_a_tree_of_the_size_of_a_house_is_dropped_with_and_without_return_number
         found = NDSM().detect(place.scene(told_returns=told_returns), RNG)
         assert len(found) == 1
         assert iou(found.polygons[0], house) > 0.9
+
+
+@pytest.mark.parametrize("numbers", ["two", "rare"])
+def test_numbers_of_returns_that_say_nothing_are_not_used(numbers):
+    house = rectangle(12, 9, at=translate(CENTRE, -15))
+    scene = Place().roof(house).tree(translate(CENTRE, 15).buffer(6)).scene()
+    count = np.full(len(scene.points), 2, dtype=np.uint8)
+    if numbers == "rare":
+        count = np.where(np.arange(len(count)) % 97 == 0, 2, 1).astype(np.uint8)
+    points = replace(scene.points, number_of_returns=count)
+    found = NDSM().detect(Scene("odd", EXTENT, points=points), RNG)
+    assert len(found) == 1
+    assert iou(found.polygons[0], house) > 0.9
+    assert "multiple returns" not in found.metadata["cues"]
+    assert any("multiple returns" in note for note in found.metadata["notes"])
+
+
+@pytest.mark.parametrize("noise", [0.03, 0.2, 0.3])
+def test_roofs_of_a_noisy_cloud_are_found_as_its_ground_shows_the_noise(noise):
+    house = rectangle(14, 9, 20)
+    place = Place().roof(house).tree(translate(CENTRE, 18, 10).buffer(5))
+    place.z += place.rng.normal(0, noise, len(place.z))
+    found = NDSM().detect(place.scene(told_returns=False), RNG)
+    assert len(found) == 1
+    assert iou(found.polygons[0], house) > 0.85
 
 
 def test_a_house_on_a_slope_of_20_degrees_is_found_with_and_without_dem():

@@ -60,6 +60,20 @@ def test_single_returns_alone_tell_nothing_of_multiple_returns():
     assert cell_cues(points, z.astype(np.float32), GRID, threshold=2.5, window=2.0).multiple_share is None
 
 
+@pytest.mark.parametrize("noise", [0.02, 0.1, 0.4])
+def test_the_noise_is_that_of_low_points(noise):
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(500, 510, 3000), rng.uniform(902, 910, 3000)
+    heights = np.where(x < 507, rng.normal(0, noise, 3000), rng.uniform(3, 9, 3000)).astype(np.float32)
+    cues = cell_cues(PointCloud(x, y, heights.astype(float)), heights, GRID, threshold=2.5, window=2.0)
+    assert cues.noise == pytest.approx(noise, rel=0.1)
+
+
+def test_without_low_points_near_each_other_no_noise_is_known():
+    x, y, z = cloud()
+    assert cell_cues(PointCloud(x, y, z), z.astype(np.float32), GRID, threshold=2.5, window=2.0).noise == 0
+
+
 @pytest.mark.parametrize("gsd", [0.25, 1.0, 2.0])
 def test_greenness_is_that_of_the_place_at_any_pixel_size(gsd):
     fine = Grid.covering(GRID.extent, gsd)

@@ -1,0 +1,96 @@
+"""Which cues carry information on a cloud, decided from the data.
+
+Nouns
+-----
+rating
+    What a cue says of each cell: -1 roof, 0 undecided, +1 tree, NaN unknown.
+separation
+    Mean rating in the cells that the other cues take for trees, less the mean in those that they take for roofs: up to
+    2; near 0 where a cue says the same of both.
+silent cue
+    One that is left out because its separation is too small. Pulses of a single-return scanner, cells of a raster and
+    files in which every pulse has two returns give such cues: they would vote for one class everywhere.
+
+Roughness is measured from the coordinates alone, whatever the sensor records of a pulse: it is the *anchor*, which is
+never silent and by which the others are tested.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ANCHOR", "CueInformation", "informative_cues"]
+
+_Floats = NDArray[np.float32]
+
+#: Name of the cue that is never silent.
+ANCHOR = "roughness"
+#: Least separation. Measured on five airborne clouds with and without their return numbers, and rastered: cues that
+#: help reach 0.33 to 1.8, those that mislead 0.2 at most.
+_LEAST_SEPARATION = 0.25
+#: Least number of cells of each class by which a cue is tested.
+_FEWEST = 50
+
+
+@dataclass(frozen=True)
+class CueInformation:
+    """Which cues are used, and why the others are silent.
+
+    Attributes
+    ----------
+    used : tuple of str
+    silent : mapping of str to str
+        Reason by cue.
+    """
+
+    used: tuple[str, ...]
+    silent: Mapping[str, str]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """One sentence for each silent cue."""
+        return tuple(f"the cue {name!r} is not used: {reason}" for name, reason in self.silent.items())
+
+
+def informative_cues(ratings: Mapping[str, _Floats], among: NDArray[np.bool_]) -> CueInformation:
+    """Return which cues separate roofs from trees, in the opinion of the others.
+
+    The cue of the least separation becomes silent first, and the rest is tested again without it. Where the others
+    know too few trees or roofs, a cue can only be tested by what it says of roofs: it is silent when it takes most of
+    them for trees.
+
+    Parameters
+    ----------
+    ratings : mapping of str to ndarray of float32, shape (rows, columns)
+    among : ndarray of bool, shape (rows, columns)
+        Cells that are roof or tree.
+    """
+    values = {name: np.where(among, rating, np.float32(np.nan))[among] for name, rating in ratings.items()}
+    silent = {name: "the points do not hold it" for name, rating in values.items() if not np.isfinite(rating).any()}
+    used = [name for name in values if name not in silent]
+    while True:
+        tested = {name: _separation(name, {other: values[other] for other in used}) for name in used if name != ANCHOR}
+        failed = {name: found for name, found in tested.items() if found < _LEAST_SEPARATION}
+        if not failed or len(used) < 2:
+            return CueInformation(tuple(used), silent)
+        worst = min(failed, key=failed.__getitem__)
+        silent[worst] = f"it says the same of roofs and trees (separation {failed[worst]:.2f} of 2)"
+        used.remove(worst)
+
+
+def _separation(name: str, values: Mapping[str, _Floats]) -> float:
+    """Return the separation of a cue by the mean of the others; 2 where it cannot be tested and may be right."""
+    own = values[name]
+    others = [np.nan_to_num(rating) for other, rating in values.items() if other != name]
+    opinion = np.mean(others, axis=0) if others else np.zeros_like(own)
+    known = np.isfinite(own)
+    trees, roofs = own[known & (opinion > 0)], own[known & (opinion < 0)]
+    if len(roofs) >= _FEWEST and roofs.mean() > 0 and (len(trees) < _FEWEST or trees.mean() <= roofs.mean()):
+        return 0.0
+    if len(trees) < _FEWEST or len(roofs) < _FEWEST:
+        return 2.0
+    return float(trees.mean() - roofs.mean())
