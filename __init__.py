@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from .evaluators.base import Evaluation, Evaluator, Index
     from .evaluators.comparison import evaluate, pool
     from .evaluators.registry import make_evaluator
+    from .evaluators.uncertainty.intervals import block_intervals
+    from .evaluators.uncertainty.paired import compare
+    from .evaluators.uncertainty.redrawn import redraw_changes
     from .reports.board import run
     from .scenes.folder import open_scene, save_scene
     from .scenes.geodata.footprints import Footprints
@@ -50,6 +53,8 @@ __all__ = [
     "RoofbenchError",
     "Scene",
     "Step",
+    "block_intervals",
+    "compare",
     "detect",
     "evaluate",
     "execution_option",
@@ -61,6 +66,7 @@ __all__ = [
     "parameter",
     "pool",
     "read_footprints",
+    "redraw_changes",
     "run",
     "save_scene",
     "write_footprints",

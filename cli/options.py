@@ -20,16 +20,20 @@ __all__ = [
     "FORMAT_HELP",
     "INDEX_HELP",
     "Assignment",
+    "BuildingIdOption",
+    "CrsOption",
     "DetectorOption",
     "DetectorSeedsOption",
     "DetectorsOption",
     "DpiOption",
+    "EvaluationAreaOption",
     "EvaluatorOption",
     "EvaluatorsOption",
     "FormatOption",
     "GsdOption",
     "IndexOption",
     "IndicesOption",
+    "IntervalOption",
     "JobsOption",
     "JoinGapsOption",
     "MemoryLimitOption",
@@ -85,6 +89,18 @@ def read_size(text: str) -> int:
     return int(float(match[1]) * {"": 1, "k": 1e3, "m": 1e6, "g": 1e9}[match[2].lower()])
 
 
+BuildingIdOption = Annotated[
+    str | None,
+    typer.Option(
+        "--building-id", metavar="COLUMN", help="Reference column; footprints with the same value are one building."
+    ),
+]
+CrsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--crs", metavar="CRS", help="CRS to assign to files whose CRS is missing or wrong, such as EPSG:25832."
+    ),
+]
 DetectorOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -106,6 +122,10 @@ DetectorSeedsOption = Annotated[
     ),
 ]
 DpiOption = Annotated[int, typer.Option("--dpi", min=30, max=1200, metavar="N", help="Resolution of a PNG, per inch.")]
+EvaluationAreaOption = Annotated[
+    str | None,
+    typer.Option("--evaluation-area", metavar="FILE", help="Polygons inside which the reference is complete."),
+]
 EvaluatorOption = Annotated[
     str | None,
     typer.Option(
@@ -140,6 +160,10 @@ IndexOption = Annotated[
 IndicesOption = Annotated[
     list[str] | None,
     typer.Option("--index", metavar="INDEX", help=f"{INDEX_HELP}; repeat for more.", autocompletion=completion.indices),
+]
+IntervalOption = Annotated[
+    float | None,
+    typer.Option("--interval", metavar="PERCENT", help="Level of the intervals of the indices, such as 95."),
 ]
 JobsOption = Annotated[
     int,

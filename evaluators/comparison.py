@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from shapely import Geometry, MultiPolygon, Polygon, is_valid, is_valid_reason
 
@@ -12,7 +12,7 @@ from ..scenes.geodata.crs import require_metric
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.geodata.raster import Grid
 from .base import Evaluation, Evaluator
-from .registry import DEFAULT, all_evaluators, make_evaluator
+from .registry import ALL, DEFAULT, all_evaluators, make_evaluator
 
 if TYPE_CHECKING:
     from .threshold_free.evaluator import ThresholdFreeEvaluation
@@ -38,6 +38,18 @@ def evaluate(
     detected: Footprints,
     reference: Footprints,
     *,
+    evaluator: Literal["all"],
+    area: Geometry | None = None,
+    grid: Grid | None = None,
+    **parameters: Any,
+) -> dict[str, Evaluation]: ...
+
+
+@overload
+def evaluate(
+    detected: Footprints,
+    reference: Footprints,
+    *,
     evaluator: str | Evaluator = DEFAULT,
     area: Geometry | None = None,
     grid: Grid | None = None,
@@ -53,7 +65,7 @@ def evaluate(
     area: Geometry | None = None,
     grid: Grid | None = None,
     **parameters: Any,
-) -> Evaluation:
+) -> Evaluation | dict[str, Evaluation]:
     """Compare detected with reference footprints.
 
     Parameters
@@ -61,7 +73,7 @@ def evaluate(
     detected, reference : Footprints
         In one projected CRS, metres.
     evaluator : str or Evaluator
-        Name, ``name[parameter=value]``, or an evaluator.
+        Name, ``name[parameter=value]``, or an evaluator; ``"all"`` for every one, see `evaluate_all`.
     area : polygon, optional
         Evaluation area: where the reference is complete.
     grid : Grid, optional
@@ -88,6 +100,8 @@ def evaluate(
     >>> evaluation.object.completeness, evaluation.geometric.rmse
     (0.5, 1.0)
     """
+    if evaluator == ALL:
+        return evaluate_all(detected, reference, area=area, grid=grid, **parameters)
     chosen = make_evaluator(evaluator, parameters)
     _require_comparable(detected, reference, area, chosen)
     return chosen.evaluate(detected, reference, area=area, grid=grid)

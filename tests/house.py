@@ -28,7 +28,14 @@ FLOORS = (("core",), ("scenes",), ("evaluators", "detectors"), ("benchmark",), (
 #: Units on one floor do not import each other, but the files of "*" may.
 UNITS = {
     "scenes": (("geodata",), ("ground",), ("*",), ("importing", "synthetic")),
-    "evaluators": (("tally", "index", "verdict_table"), ("overlay",), ("base",), ("threshold_free",), ("*",)),
+    "evaluators": (
+        ("tally", "index", "verdict_table"),
+        ("overlay",),
+        ("base",),
+        ("threshold_free",),
+        ("*",),
+        ("uncertainty",),
+    ),
     "detectors": (("steps",), ("base",), ("shared",), ("*",), ("ndsm", "lines", "mpp", "dempster_shafer", "external")),
     "benchmark": (("identity",), ("store",), ("suite",), ("plan",), ("execution",), ("analysis",), ("*",)),
     "reports": (("*",), ("steps",)),

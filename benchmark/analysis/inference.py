@@ -16,48 +16,26 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...core.resampling import expanded_level, resampling_weights
+
 __all__ = [
     "LEVEL",
     "bootstrap_interval",
-    "expanded_level",
     "holm",
     "letter_groups",
     "lowest_p",
     "paired_p",
-    "resampling_weights",
     "scenes_needed",
     "sign_flip_p",
 ]
 
 LEVEL = 0.05
-_RESAMPLES = 4000
 _MOST_ENUMERATED = 16  # 2^16 sign patterns
 _LATTICE = 4096  # steps between zero and the largest difference
-
-
-@lru_cache(maxsize=64)
-def resampling_weights(count: int, resamples: int = _RESAMPLES) -> NDArray[np.int64]:
-    """Return how often each of `count` scenes is drawn in each resample, shape (resamples, count)."""
-    rng = np.random.default_rng(np.random.SeedSequence([count, resamples]))
-    weights = rng.multinomial(count, np.full(count, 1 / count), size=resamples)
-    weights.flags.writeable = False  # shared by all callers
-    return weights
-
-
-@lru_cache(maxsize=256)
-def expanded_level(count: int, level: float = LEVEL) -> float:
-    """Return the tail probability at which percentiles of `count` resampled values cover as a t interval does.
-
-    Plain percentiles are too narrow for few values; for many, this tends to ``level / 2``.
-    """
-    from scipy import special  # importing scipy.stats takes a second
-
-    return float(special.ndtr(-math.sqrt(count / (count - 1)) * special.stdtrit(count - 1, 1 - level / 2)))
 
 
 def bootstrap_interval(values: ArrayLike, *, level: float = LEVEL) -> tuple[float, float] | None:

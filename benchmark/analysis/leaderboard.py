@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...core.resampling import expanded_level, resampling_weights
 from ...evaluators.base import Evaluation, Evaluator, Index
 from ...evaluators.tally import Tallies
 from ..plan import KeyedEvaluator
@@ -18,11 +19,9 @@ from ..store.writer import Store
 from .inference import (
     LEVEL,
     bootstrap_interval,
-    expanded_level,
     holm,
     letter_groups,
     paired_p,
-    resampling_weights,
     scenes_needed,
 )
 from .results import Cell, Entry, Leaderboard, UnsuccessfulRun

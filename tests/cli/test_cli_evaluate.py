@@ -279,3 +279,36 @@ def test_real_detections_of_seven_detectors_compare_in_every_pair():
                 assert result.pixel.quality == 1
             else:
                 assert 0.3 < result.object.quality < 1
+
+
+def test_intervals_and_a_redrawn_reference_stand_beside_the_values(files):
+    options = ("--interval", "90", "--reference-error", "0.2", "--redraws", "4")
+    result = json.loads(roofbench("evaluate", "d.geojson", "r.gpkg", *options, "-f", "json", folder=files).stdout)
+    low, high = result["uncertainty"]["interval"]["ends"]["object.completeness"]
+    assert low <= result["object"]["completeness"] <= high
+    assert result["uncertainty"]["interval"]["blocks"] == 4
+    assert 0 < result["uncertainty"]["reference_error"]["changes"]["pixel.quality"] < 0.2
+    table = roofbench("evaluate", "d.geojson", "r.gpkg", *options, folder=files).stdout
+    assert all(text in table for text in ("90 %", "reference ±0.2 m", "4 redraws"))
+    rows = list(
+        csv.DictReader(
+            io.StringIO(
+                roofbench("evaluate", "d.geojson", "r.gpkg", *options, "-f", "csv", "-e", "all", folder=files).stdout
+            )
+        )
+    )
+    assert {"low", "high", "reference_change"} <= rows[0].keys()
+    assert rows[0]["low"] == str(low)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--interval", "0"), "--interval 0 is no level in percent"),
+        (("--reference-error", "-1"), "--reference-error -1 is no digitising error"),
+        (("--redraws", "5"), "--redraws needs --reference-error"),
+    ],
+)
+def test_uncertainty_that_cannot_be_found_is_refused(files, options, message):
+    failed = roofbench("evaluate", "d.geojson", "r.gpkg", *options, folder=files, expect=2)
+    assert message in failed.stderr

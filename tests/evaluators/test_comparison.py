@@ -54,6 +54,12 @@ def test_all_evaluators_compare_the_same_sets_with_the_parameters_that_they_have
     assert {evaluation.evaluator.minimum_area for evaluation in found.values()} == {5.0}
 
 
+def test_every_evaluator_is_asked_for_by_one_word():
+    found = rb.evaluate(HOUSES, HOUSES, evaluator="all", minimum_area=5)
+    assert list(found) == list(evaluate_all(HOUSES, HOUSES))
+    assert found["iou"].values["iou.f1"] == 1
+
+
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [

@@ -1,0 +1,98 @@
+"""What ``evaluate`` and ``compare`` read and where they write: footprints, the reference with its area, and targets."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import typer
+
+if TYPE_CHECKING:
+    from shapely import Geometry
+
+    from ..scenes.geodata.footprints import Footprints
+    from ..scenes.geodata.raster import Grid
+
+__all__ = ["Truth", "check_targets", "print_problems", "read_truth", "short_name"]
+
+
+class Truth(NamedTuple):
+    """The reference, the polygon inside which it is complete, and the pixel grid of its scene."""
+
+    footprints: Footprints
+    area: Geometry | None
+    grid: Grid | None
+
+
+def read_truth(reference: str, *, building_id: str | None, crs: str | None, evaluation_area: str | None) -> Truth:
+    """Read the reference from a vector file or a scene folder, with its evaluation area and pixel grid."""
+    from ..core.errors import InputError
+    from ..scenes.geodata.vector_files import read_footprints, read_polygon
+
+    if Path(reference).is_dir():
+        from ..scenes.folder import open_scene
+
+        scene = open_scene(reference)
+        if scene.reference is None:
+            raise InputError(f"{reference}: the scene has no reference footprints: name a vector file")
+        if building_id is not None:
+            raise InputError(
+                f"{reference} is a scene with its own building ids: leave out building_id=, or name a vector file"
+            )
+        truth = Truth(scene.reference, scene.area, scene.evaluation_grid)
+    else:
+        truth = Truth(read_footprints(reference, crs=crs, building_id=building_id), None, None)
+    if evaluation_area:
+        truth = truth._replace(area=read_polygon(evaluation_area, crs=crs, common_with=truth.footprints))
+    return truth
+
+
+def print_problems(detected: Sequence[Footprints], truth: Truth, *, evaluation_area: str | None, quiet: bool) -> None:
+    """Print repairs and signs of different places to standard error; refuse an area that holds no footprint."""
+    from ..core.errors import InputError
+    from ..scenes.geodata.common_place import place_warnings, reaches
+
+    every = [*detected, truth.footprints]
+    if not quiet:
+        for footprints in every:
+            for repair in footprints.repairs[:10]:
+                typer.echo(f"{footprints.source}: {repair}", err=True)
+            if len(footprints.repairs) > 10:
+                typer.echo(f"{footprints.source}: {len(footprints.repairs) - 10} more repaired or left out", err=True)
+            if not len(footprints):
+                typer.echo(f"{footprints.source}: no footprints", err=True)
+        for found in detected:
+            for warning in place_warnings(found, truth.footprints):
+                typer.echo(warning, err=True)
+    if evaluation_area and not any(reaches(truth.area, footprints) for footprints in every):
+        raise InputError(
+            f"{evaluation_area} holds none of the footprints, neither detected nor reference: "
+            "check that it shows the same place in the CRS that it names"
+        )
+
+
+def check_targets(verdicts: Path | None, plot: Path | None, *, inputs: tuple[str | None, ...], overwrite: bool) -> None:
+    """Raise `OutputError` for any output that could not be written, before there is a first one."""
+    from ..core.errors import OutputError
+    from ..core.output import check_target
+    from ..scenes.geodata.vector_files import output_driver, split_layer
+
+    read = {os.path.realpath(split_layer(name)[0]) for name in inputs if name}
+    for target in (verdicts, plot):
+        if target is not None:
+            check_target(target, overwrite)
+            if os.path.realpath(target) in read:
+                raise OutputError(f"{target} is an input of this comparison: name another file")
+    if verdicts is not None:
+        output_driver(verdicts)
+    if plot is not None:
+        from ..reports.figures import check_picture
+
+        check_picture(plot)
+
+
+def short_name(path: str) -> str:
+    """Return the last part of a path, with its layer."""
+    return path.replace("\\", "/").rstrip("/").rpartition("/")[2]
