@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import shapely
@@ -24,6 +25,7 @@ from .polygon_overlay import common_ground
 __all__ = [
     "Counted",
     "LeftOut",
+    "Measured",
     "clipped",
     "counted_detections",
     "counted_references",
@@ -37,6 +39,20 @@ _OUTSIDE = "left out: its centre lies outside the evaluation area"
 _SMALL = "left out: smaller than the minimum area"
 _ONLY_LEFT_OUT = "left out: overlaps only references that are left out"
 _REASONS = np.array(["", _OUTSIDE, _SMALL, _ONLY_LEFT_OUT], dtype=object)
+
+
+class Measured(Protocol):
+    """Objects with areas and centres; `Footprints` are such."""
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """Area of each object, m2, shape (n,)."""
+
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """Centre of each object, m, shape (n, 2)."""
+
+    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,13 +103,13 @@ class Counted:
 
 
 def counted_references(
-    reference: Footprints, *, area: shapely.Geometry | None = None, minimum_area: float = 0.0
+    reference: Measured, *, area: shapely.Geometry | None = None, minimum_area: float = 0.0
 ) -> Counted:
     """Return which references count.
 
     Parameters
     ----------
-    reference : Footprints
+    reference : Measured
     area : polygon, optional
         Evaluation area.
     minimum_area : float
@@ -108,7 +124,7 @@ def counted_references(
 
 
 def counted_detections(
-    detected: Footprints,
+    detected: Measured,
     overlaps: Overlaps,
     references: Counted,
     *,
@@ -119,7 +135,7 @@ def counted_detections(
 
     Parameters
     ----------
-    detected : Footprints
+    detected : Measured
     overlaps : Overlaps
         Overlapping (detection, reference) pairs, left-out references included.
     references : Counted
@@ -137,7 +153,7 @@ def counted_detections(
     return Counted(code)
 
 
-def _centres_inside(footprints: Footprints, area: shapely.Geometry) -> NDArray[np.bool_]:
+def _centres_inside(footprints: Measured, area: shapely.Geometry) -> NDArray[np.bool_]:
     centres = footprints.centres
     inside: NDArray[np.bool_] = shapely.intersects_xy(area, centres[:, 0], centres[:, 1])
     return inside

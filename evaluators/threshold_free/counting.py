@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..overlay.areas import AreaTally, exact_areas
+from ..overlay.exact_sum import exact_sum
 from ..overlay.left_out import clipped, remeasured
+from ..overlay.outline_distances import PairDistances
 from ..overlay.overlaps import shared_areas
 from ..overlay.pixels import pixel_areas
 from .object_graph import OverlapGraph
-from .tallies import Buildings, Counts
+from .tallies import Buildings, Counts, PairSums
 
-__all__ = ["count_buildings", "count_objects", "measure_areas"]
+__all__ = ["count_buildings", "count_objects", "measure_areas", "pair_sums"]
 
 
 def count_objects(graph: OverlapGraph) -> Counts:
@@ -114,4 +117,21 @@ def measure_areas(
         false_positives=false_positives,
         false_negatives=false_negatives,
         within=within,
+    )
+
+
+def pair_sums(graph: OverlapGraph, outlines: PairDistances, gsd: float | None) -> PairSums:
+    """Return the sums over the TP pairs; `gsd` is the ground sampling distance of the pixels, m, where it is known."""
+    squared: NDArray[np.float64] = outlines.outline**2
+    centre = graph.distances[graph.matched_overlaps]
+    sum_squared = exact_sum(squared)
+    return PairSums(
+        pairs=len(squared),
+        pairs_by_corners=int(outlines.by_corners.sum()),
+        sum_squared=sum_squared,
+        sum_squared_pixels=sum_squared / gsd**2 if gsd else 0.0,
+        pairs_with_gsd=len(squared) if gsd else 0,
+        sum_squared_centre=exact_sum(centre**2),
+        sum_centre=exact_sum(centre),
+        sum_polis=exact_sum(outlines.polis),
     )

@@ -11,9 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, Literal
 
-import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.parameters import parameter
@@ -21,12 +19,11 @@ from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..base import Evaluation, Evaluator
-from ..overlay.exact_sum import exact_sum
 from ..overlay.left_out import LeftOut, left_out_notes, repair_notes
 from ..overlay.outline_distances import PairDistances, pair_distances
 from ..verdict_table import Verdicts
 from .correspondence import MATCHINGS
-from .counting import count_buildings, count_objects, measure_areas
+from .counting import count_buildings, count_objects, measure_areas, pair_sums
 from .indices import (
     GROUPS,
     BuildingIndices,
@@ -36,7 +33,7 @@ from .indices import (
     PixelIndices,
 )
 from .object_graph import ObjectGraph, OverlapGraph, object_graph
-from .tallies import Counts, PairSums, Scenes, ThresholdFreeTallies
+from .tallies import Counts, Scenes, ThresholdFreeTallies
 from .verdicts import MEASURES, VERDICT_KINDS, find_verdicts
 
 __all__ = ["ThresholdFree", "ThresholdFreeEvaluation"]
@@ -169,8 +166,8 @@ class ThresholdFree(Evaluator):
             scenes=Scenes(all=1, by_pixels=int(by_pixels)),
             left_out=LeftOut.of(graph.detections, graph.references),
             areas=measure_areas(graph, detected, reference, area=area, lattice=lattice if by_pixels else None),
-            geometric=_pair_sums(graph, outlines, lattice.gsd if lattice else None),
-            iou=_NO_IOU.filled(graph.pair_iou),
+            geometric=pair_sums(graph, outlines, lattice.gsd if lattice else None),
+            iou=ThresholdFreeTallies().iou.filled(graph.pair_iou),
         )
         return ThresholdFreeEvaluation(
             evaluator=self,
@@ -197,9 +194,6 @@ class ThresholdFree(Evaluator):
         return grid
 
 
-_NO_IOU = ThresholdFreeTallies().iou
-
-
 def _verdicts(graph: OverlapGraph, outlines: PairDistances, detected: Footprints, reference: Footprints) -> Verdicts:
     tables = find_verdicts(graph, outlines.outline)
     return Verdicts(
@@ -209,22 +203,6 @@ def _verdicts(graph: OverlapGraph, outlines: PairDistances, detected: Footprints
         reference_table=tables[1],
         detected=detected,
         reference=reference,
-    )
-
-
-def _pair_sums(graph: OverlapGraph, outlines: PairDistances, gsd: float | None) -> PairSums:
-    squared: NDArray[np.float64] = outlines.outline**2
-    centre = graph.distances[graph.matched_overlaps]
-    sum_squared = exact_sum(squared)
-    return PairSums(
-        pairs=len(squared),
-        pairs_by_corners=int(outlines.by_corners.sum()),
-        sum_squared=sum_squared,
-        sum_squared_pixels=sum_squared / gsd**2 if gsd else 0.0,
-        pairs_with_gsd=len(squared) if gsd else 0,
-        sum_squared_centre=exact_sum(centre**2),
-        sum_centre=exact_sum(centre),
-        sum_polis=exact_sum(outlines.polis),
     )
 
 

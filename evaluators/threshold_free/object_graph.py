@@ -7,21 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
-from ..overlay.left_out import Counted, counted_detections, counted_references
+from ..overlay.left_out import Counted, Measured, counted_detections, counted_references
 from ..overlay.overlaps import Overlaps, overlaps_between, overlaps_within
 from .correspondence import Correspondence, match
 
-__all__ = ["ObjectGraph", "Objects", "OverlapGraph", "object_graph"]
+__all__ = ["ObjectGraph", "Objects", "OverlapGraph", "object_graph", "overlap_graph"]
 
 
-class Objects(Protocol):
+class Objects(Measured, Protocol):
     """What the graph asks of the footprints of one side; `Footprints` have all of it."""
 
     @property
@@ -29,14 +29,8 @@ class Objects(Protocol):
         """Row of each object in its source, shape (n,)."""
 
     @property
-    def areas(self) -> NDArray[np.float64]:
-        """Area of each object, m2, shape (n,)."""
-
-    @property
     def building_codes(self) -> NDArray[np.int64]:
         """Building of each object, shape (n,)."""
-
-    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -127,8 +121,54 @@ def object_graph(
     minimum_area : float
         Smaller references do not count, m2.
     """
+    return ObjectGraph(
+        **_linked(
+            detected,
+            reference,
+            overlaps_between(detected, reference).only_significant,
+            (overlaps_within(detected), overlaps_within(reference)),
+            matching=matching,
+            area=area,
+            minimum_area=minimum_area,
+        )
+    )
+
+
+def overlap_graph(
+    detected: Objects,
+    reference: Objects,
+    candidates: Overlaps,
+    within: tuple[Overlaps, Overlaps],
+    *,
+    matching: str = "nearest",
+    minimum_area: float = 0.0,
+) -> OverlapGraph:
+    """Leave out what does not count, and match; for overlaps that were found elsewhere.
+
+    Parameters
+    ----------
+    candidates : Overlaps
+        All overlapping (detection, reference) pairs.
+    within : tuple of Overlaps
+        Pairs of detections, and pairs of references, that share any area.
+    """
+    return OverlapGraph(
+        **_linked(detected, reference, candidates, within, matching=matching, area=None, minimum_area=minimum_area)
+    )
+
+
+def _linked(
+    detected: Objects,
+    reference: Objects,
+    candidates: Overlaps,
+    within: tuple[Overlaps, Overlaps],
+    *,
+    matching: str,
+    area: shapely.Geometry | None,
+    minimum_area: float,
+) -> dict[str, Any]:
+    """Return the fields of the graph."""
     references = counted_references(reference, area=area, minimum_area=minimum_area)
-    candidates = overlaps_between(detected, reference).only_significant
     usable = candidates.where(references.mask[candidates.second])
     distances = _centre_distances(detected, reference, usable)
     correspondence = match(usable, distances, (len(detected), len(reference)), matching=matching)
@@ -136,19 +176,19 @@ def object_graph(
         detected, candidates, references, matched=correspondence.of_detection >= 0, area=area
     )
     kept = detections.mask[usable.first]
-    return ObjectGraph(
-        detected=detected,
-        reference=reference,
-        overlaps=usable.where(kept),
-        distances=distances[kept],
-        within=(overlaps_within(detected), overlaps_within(reference)),
-        correspondence=correspondence,
-        detections=detections,
-        references=references,
-    )
+    return {
+        "detected": detected,
+        "reference": reference,
+        "overlaps": usable.where(kept),
+        "distances": distances[kept],
+        "within": within,
+        "correspondence": correspondence,
+        "detections": detections,
+        "references": references,
+    }
 
 
-def _centre_distances(detected: Footprints, reference: Footprints, pairs: Overlaps) -> NDArray[np.float64]:
+def _centre_distances(detected: Objects, reference: Objects, pairs: Overlaps) -> NDArray[np.float64]:
     offsets = detected.centres[pairs.first] - reference.centres[pairs.second]
     distances: NDArray[np.float64] = np.hypot(offsets[:, 0], offsets[:, 1])
     return distances
