@@ -7,6 +7,7 @@ Data goes to standard output, messages and progress to standard error. Commands 
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from typing import Annotated
@@ -53,6 +54,9 @@ def _root(
 
 def main() -> None:
     """Run the command line; errors of roofbench and of the file system end with one sentence and exit code 2."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # File names that are not UTF-8, and terminals that have few letters: what cannot be shown is escaped.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         try:
             app(prog_name="roofbench")

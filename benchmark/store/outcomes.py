@@ -76,7 +76,7 @@ class Score:
             code=code,
             tallies=evaluation.tallies.to_dict(),
             values=dict(evaluation.values),
-            notes=tuple(evaluation.notes),
+            notes=tuple(_storable(list(evaluation.notes))),
             verdicts=() if given is None else tuple(table.to_bytes() for _, table, _ in given.sides),
         )
 
@@ -97,6 +97,9 @@ class ScoreFailure:
     evaluator: PluginRecipe
     code: str
     reason: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "reason", _storable(self.reason))
 
 
 def plain_value(value: Any) -> Any:
@@ -168,6 +171,11 @@ class Outcome:
     scene: SceneRecord | None = None
     machine: Mapping[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        # Texts of a plugin: a file name that is not UTF-8 holds lone surrogates, which no file can store.
+        for name in ("reason", "traceback", "attributes", "metadata"):
+            object.__setattr__(self, name, _storable(getattr(self, name)))
+
     def to_bytes(self) -> bytes:
         """Return a JSON header followed by the geometries."""
         header = _fields(self)
@@ -223,6 +231,17 @@ class Outcome:
                 record[name] = None if record[name] is None else tuple(record[name])
             header["scene"] = SceneRecord(**record)
         return cls(**header)
+
+
+def _storable(value: Any) -> Any:
+    """Return texts, however nested, in characters that UTF-8 has."""
+    if isinstance(value, str):
+        return value if value.isascii() else value.encode(errors="backslashreplace").decode()
+    if isinstance(value, Mapping):
+        return {_storable(name): _storable(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_storable(item) for item in value]
+    return value
 
 
 def _fields(record: Any) -> dict[str, Any]:

@@ -425,6 +425,8 @@ def polygonal_part(geometry: shapely.Geometry, *, grid_size: float | None = None
     >>> polygonal_part(mixed).geom_type, polygonal_part(shapely.Point(0, 0)).wkt
     ('Polygon', 'MULTIPOLYGON EMPTY')
     """
-    parts = shapely.get_parts(shapely.get_parts(geometry))
+    parts = shapely.get_parts(geometry)
+    while (shapely.get_type_id(parts) > 3).any():  # multipolygons and collections, nested to any depth
+        parts = shapely.get_parts(parts)
     polygons = parts[shapely.get_type_id(parts) == 3]
     return shapely.union_all(polygons, grid_size=grid_size) if len(polygons) else shapely.MultiPolygon()

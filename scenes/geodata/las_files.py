@@ -112,7 +112,8 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None, fal
             raise InputError(f"{file}: the bounds in its header, {bounds}, are not finite: export it again")
         if not any(bounds):
             raise InputError(
-                f"{file}: the bounds in its header are all 0: write the header anew, for instance with lasinfo -repair"
+                f"{file}: the bounds in its header are all 0: write the header anew, for instance with lasinfo "
+                "-repair, or export it again if all its points lie at (0, 0, 0)"
             )
         own = None if crs is not None else header_crs(file, header, fallback)
         names = set(header.point_format.dimension_names)
@@ -304,7 +305,9 @@ def _opened(file: Path) -> Iterator[Any]:
         )
     refuse_record_counts(file, head)
     try:
-        with laspy.open(file) as reader:
+        # Not laszip, which laspy would take where it is installed: the same decompressor reads everywhere.
+        backends = (laspy.LazBackend.LazrsParallel, laspy.LazBackend.Lazrs)
+        with laspy.open(file, laz_backend=backends) as reader:
             yield reader
     except InputError:
         raise

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError, OutputError
 from ...core.inputs import require_file
+from ...core.plain_paths import plain_path
 from .crs import file_crs
 from .footprints import Repair
 from .wkb import geometries_of_wkb
@@ -27,7 +28,8 @@ def read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[Any
     closed: list[Repair] = []
     try:
         try:
-            frame = geopandas.read_parquet(file)
+            with plain_path(file) as path:
+                frame = geopandas.read_parquet(path)
         except shapely.errors.GEOSException:  # one ring that is not closed spoils the whole column
             frame, closed = _read_wkb(geopandas, file)
     except shapely.errors.GEOSException as error:
@@ -49,7 +51,8 @@ def _read_wkb(geopandas: Any, file: Path) -> tuple[Any, list[Repair]]:
     """Return the frame of a file whose geometries are WKB, with its rings closed."""
     import pyarrow.parquet
 
-    table = pyarrow.parquet.read_table(file)
+    with plain_path(file) as path:
+        table = pyarrow.parquet.read_table(path)
     facts = json.loads(table.schema.metadata[b"geo"])
     name = facts["primary_column"]
     geometries, closed = geometries_of_wkb(np.array(table[name].to_pylist(), dtype=object), file)

@@ -22,16 +22,17 @@ from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError
 from ...core.inputs import require_file
+from ...core.plain_paths import plain_path
 from .crs import file_crs
 from .raster import Elevation, Grid, Image
 
 __all__ = [
     "BANDS",
     "RasterHeader",
+    "alpha_of",
     "assumed_bands",
     "band_names",
     "data_mask",
-    "is_opaque",
     "looks_like_values",
     "opened",
     "read_elevation",
@@ -74,6 +75,8 @@ class RasterHeader:
         From the values in the file to heights: ``value * scale + offset``; mostly 1 and 0.
     alpha : bool
         Whether a further, last band is marked as alpha. Many programs mark near infrared so.
+    mask_band : bool
+        Whether a further, last band without a name holds a mask: one value beside 0, the highest or 1.
     """
 
     path: Path
@@ -88,6 +91,7 @@ class RasterHeader:
     scale: float
     offset: float
     alpha: bool = False
+    mask_band: bool = False
 
 
 def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) -> RasterHeader:
@@ -134,20 +138,22 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
             raise InputError(
                 f"{file} has a colour table instead of bands: expand it, for instance with gdal_translate -expand rgb"
             )
-        count = sum(colour.name != "alpha" for colour in colours)
+        mask_band = _holds_mask(source)
+        count = sum(colour.name != "alpha" for colour in colours) - mask_band
         return RasterHeader(
             path=file,
             crs=own,
             grid=grid,
             band_count=count,
             band_names=tuple((text or "").lower() for text in source.descriptions[:count]),
-            colours=tuple(colour.name for colour in colours if colour.name != "alpha"),
+            colours=tuple(colour.name for colour in colours if colour.name != "alpha")[:count],
             dtype=source.dtypes[0],
             square=abs(a + e) <= 1e-6 * a,
             height_unit=_height_unit(source),
             scale=source.scales[0],
             offset=source.offsets[0],
             alpha=count < len(colours) and colours[-1].name == "alpha",
+            mask_band=mask_band,
         )
 
 
@@ -169,7 +175,7 @@ def read_image(
     names = band_names(header, bands)
     require_image_type(header)
     part = _part(header, window)
-    with opened(header.path, opaque=is_opaque(header, names)) as source:
+    with opened(header.path, alpha=alpha_of(header, names)) as source:
         indexes, kept = _band_indexes(names)
         values = source.read(indexes, window=part)
         valid = data_mask(source, part)
@@ -205,7 +211,8 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
             raise InputError(
                 f"bands= has {unknown[0]!r}, which is no band name; use {', '.join(BANDS)}, and - to skip one"
             )
-        if len(bands) != header.band_count and not (header.alpha and len(bands) == header.band_count + 1):
+        further = header.alpha or header.mask_band
+        if len(bands) != header.band_count and not (further and len(bands) == header.band_count + 1):
             raise InputError(
                 f"{header.path} has {header.band_count} bands, but bands= names {len(bands)} "
                 f"({','.join(bands)}): name one for each, - to skip one"
@@ -246,9 +253,11 @@ def assumed_bands(header: RasterHeader, bands: Sequence[str] | None) -> str | No
     return None
 
 
-def is_opaque(header: RasterHeader, names: Sequence[str]) -> bool:
-    """Return whether the names make a band of values of the one that is marked as alpha."""
-    return len(names) > header.band_count and names[-1] != "-"
+def alpha_of(header: RasterHeader, names: Sequence[str]) -> bool | None:
+    """Return whether the last band is read as a mask (True), as values (False), or as the file marks it (None)."""
+    if len(names) > header.band_count and names[-1] != "-":
+        return False
+    return True if header.mask_band else None
 
 
 def looks_like_values(header: RasterHeader) -> bool:
@@ -259,6 +268,21 @@ def looks_like_values(header: RasterHeader) -> bool:
         rows, columns = (min(side, 512) for side in source.shape)
         values = np.unique(source.read(source.count, out_shape=(rows, columns)))
     return len(values) > 8  # soft edges of a mosaic have some
+
+
+def _holds_mask(source: Any) -> bool:
+    """Return whether the fourth band, unnamed and of no colour, holds 0 and one more value: no infrared does."""
+    from rasterio.windows import Window
+
+    if source.count != 4 or source.colorinterp[3].name != "undefined" or source.descriptions[3]:
+        return False
+    if source.dtypes[3] not in ("uint8", "uint16"):
+        return False
+    seen: set[int] = set()
+    for row in range(0, source.height, max(64, source.height // 8)):
+        for column in range(0, source.width, max(64, source.width // 8)):
+            seen.update(np.unique(source.read(4, window=Window(column, row, 64, 64))).tolist())
+    return (seen - {0}) in ({1}, {255}, {65535})
 
 
 def write_image(image: Image, path: str | os.PathLike[str], *, crs: str | None = None) -> None:
@@ -309,10 +333,10 @@ def _profile(grid: Grid, crs: str | None, count: int, dtype: str) -> dict[str, A
 
 
 @contextmanager
-def opened(file: Path, *, opaque: bool = False) -> Iterator[Any]:
+def opened(file: Path, *, alpha: bool | None = None) -> Iterator[Any]:
     """Open a raster; what rasterio raises inside the block becomes one sentence.
 
-    With `opaque` its alpha band is a band as others are, and masks nothing.
+    With `alpha` False no band masks, with True the last one does, whatever the file says.
     """
     import warnings
 
@@ -321,15 +345,16 @@ def opened(file: Path, *, opaque: bool = False) -> Iterator[Any]:
 
     require_file(file, "a raster, for instance a GeoTIFF")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)  # reported as an error by read_raster_header
-            source = rasterio.open(file)
-        with source:
-            if not opaque:
-                yield source
-                return
-            with _without_alpha(source) as view:
-                yield view
+        with plain_path(file) as path:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)  # reported as an error by read_raster_header
+                source = rasterio.open(path)
+            with source:
+                if alpha is None:
+                    yield source
+                    return
+                with _with_last_band(source, "alpha" if alpha else "undefined") as view:
+                    yield view
     except RasterioError as error:
         cause = error.__cause__ or error
         reason = " ".join(str(cause).split())
@@ -337,8 +362,8 @@ def opened(file: Path, *, opaque: bool = False) -> Iterator[Any]:
 
 
 @contextmanager
-def _without_alpha(source: Any) -> Iterator[Any]:
-    """Open a view of a raster in which no band is marked as alpha."""
+def _with_last_band(source: Any, colour: str) -> Iterator[Any]:
+    """Open a view of a raster whose last band has another colour interpretation, and no other band is alpha."""
     import rasterio
     from rasterio.enums import ColorInterp
     from rasterio.io import MemoryFile
@@ -347,9 +372,8 @@ def _without_alpha(source: Any) -> Iterator[Any]:
     with MemoryFile(ext=".vrt") as memory:
         copy(source, memory.name, driver="VRT")
         with rasterio.open(memory.name, "r+") as view:
-            view.colorinterp = [
-                ColorInterp.undefined if colour == ColorInterp.alpha else colour for colour in view.colorinterp
-            ]
+            others = [ColorInterp.undefined if kind == ColorInterp.alpha else kind for kind in view.colorinterp[:-1]]
+            view.colorinterp = [*others, ColorInterp[colour]]
         with rasterio.open(memory.name) as view:
             yield view
 

@@ -6,7 +6,8 @@ smaller, else bilinear. Where files overlap the first that has data wins.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,16 +16,66 @@ from numpy.typing import NDArray
 from ...core.errors import CRSError, InputError
 from .crs import crs_label, same_crs
 from .raster import Elevation, Grid, Image
-from .raster_files import RasterHeader, band_names, data_mask, is_opaque, opened, require_image_type
+from .raster_files import RasterHeader, alpha_of, band_names, data_mask, opened, require_image_type
 
 __all__ = ["mosaic_elevation", "mosaic_image", "resampling_note", "warped_extent", "warped_size"]
 
+#: Largest mean difference of two images of one place that are copies of each other, as a share of the largest value.
+_SAME_IMAGE = 0.05
 
-def mosaic_image(headers: Sequence[RasterHeader], grid: Grid, *, crs: str, bands: Sequence[str] | None = None) -> Image:
+
+@dataclass
+class _Overlap:
+    """How much of an image lies under those before it, and how much it differs from them.
+
+    Attributes
+    ----------
+    cells, shared : int
+        Cells with data, and those of them that have a value already.
+    difference : float
+        Sum of the absolute differences over the shared cells, mean over the bands, as a share of the largest value.
+    """
+
+    cells: int = 0
+    shared: int = 0
+    difference: float = 0.0
+
+    def add(
+        self, has_data: NDArray[np.bool_], known: NDArray[np.bool_], before: NDArray[Any], block: NDArray[Any]
+    ) -> None:
+        self.cells += int(has_data.sum())
+        self.shared += int(known.sum())
+        if known.any():
+            one, two = before[:, known].astype(np.float32), block[:, known].astype(np.float32)
+            self.difference += float(np.abs(one - two).mean(axis=0).sum() / max(1.0, one.max(), two.max()))
+
+    @property
+    def is_whole(self) -> bool:
+        return self.cells > 0 and self.shared >= 0.98 * self.cells
+
+    @property
+    def is_another_image(self) -> bool:
+        return self.is_whole and self.difference > _SAME_IMAGE * self.shared
+
+
+def mosaic_image(
+    headers: Sequence[RasterHeader],
+    grid: Grid,
+    *,
+    crs: str,
+    bands: Sequence[str] | None = None,
+    note: Callable[[str], None] | None = None,
+) -> Image:
     """Bring one or several orthoimages to `grid` in `crs`; a file that names no CRS is taken to be in it.
 
     Files whose cells coincide with those of `grid` are copied, others resampled: averaged when their cells are much
-    smaller, else bilinear.
+    smaller, else bilinear. A file of which nothing is used, since others cover it, is reported by `note`.
+
+    Raises
+    ------
+    InputError
+        Images of different bands or depths, or a file of which nothing would be used though it differs from the
+        others by more than 5 % of the largest value: infrared beside RGB.
     """
     named = [band_names(header, bands) for header in headers]
     kept = tuple(name for name in named[0] if name != "-")
@@ -32,7 +83,8 @@ def mosaic_image(headers: Sequence[RasterHeader], grid: Grid, *, crs: str, bands
         if set(names) - {"-"} != set(kept):
             raise InputError(
                 f"{header.path} has the bands {', '.join(names)} but {headers[0].path} {', '.join(kept)}: "
-                "images of one scene must have the same"
+                "images of one scene must have the same; stack infrared of the same place into one file, for instance "
+                "with gdalbuildvrt -separate, and name its bands by bands="
             )
         require_image_type(header)
         if header.dtype != headers[0].dtype:
@@ -44,10 +96,20 @@ def mosaic_image(headers: Sequence[RasterHeader], grid: Grid, *, crs: str, bands
     valid = np.zeros(grid.shape, dtype=bool)
     for header, names in zip(headers, named, strict=True):
         indexes = [names.index(name) + 1 for name in kept]
-        for rows, columns, block, has_data in _warped(header, indexes, grid, crs, opaque=is_opaque(header, names)):
+        shared = _Overlap()
+        for rows, columns, block, has_data in _warped(header, indexes, grid, crs, alpha=alpha_of(header, names)):
             fresh = has_data & ~valid[rows, columns]
+            shared.add(has_data, has_data & ~fresh, values[:, rows, columns], block)
             values[:, rows, columns][:, fresh] = block[:, fresh]
             valid[rows, columns] |= fresh
+        if shared.is_another_image:
+            raise InputError(
+                f"{header.path} shows the same place as other images of the scene, with other values: nothing of it "
+                "would be used. Give one of them; if one is infrared, stack the bands into one file, for instance "
+                "with gdalbuildvrt -separate, and name them by bands="
+            )
+        if shared.is_whole and note is not None:
+            note(f"{header.path.name} is not used: other images have data in all of its cells")
     return Image(values, kept, grid, None if valid.all() else valid)
 
 
@@ -97,7 +159,7 @@ def warped_size(header: RasterHeader, crs: str) -> float:
 
 
 def _warped(
-    header: RasterHeader, indexes: list[int], grid: Grid, crs: str, *, opaque: bool = False
+    header: RasterHeader, indexes: list[int], grid: Grid, crs: str, *, alpha: bool | None = None
 ) -> Iterator[tuple[slice, slice, NDArray[Any], NDArray[np.bool_]]]:
     """Yield (rows, columns, values, has data) of the part of `grid` that a file covers, by bands of rows."""
     from rasterio import Affine
@@ -110,7 +172,7 @@ def _warped(
     rows = _span(-bounds[3], -bounds[1], -grid.north, grid.gsd, grid.rows)
     if columns is None or rows is None:
         return
-    with opened(header.path, opaque=opaque) as source:
+    with opened(header.path, alpha=alpha) as source:
         ratio = grid.gsd / header.grid.gsd
         resampling = Resampling.average if ratio > 1.5 else Resampling.bilinear
         if not warp and header.square and _same_cells(grid, header.grid):

@@ -8,9 +8,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +19,11 @@ from numpy.typing import NDArray
 from ...core.errors import CRSError, InputError, OutputError
 from ...core.inputs import require_file
 from ...core.output import whole_file
+from ...core.plain_paths import plain_path, plain_target
 from ...core.registry import nearest_hint
 from .crs import common_crs, crs_label, file_crs, named_crs, parse_crs, require_metric, same_crs
 from .footprints import Footprints, Repair
+from .ogr_layers import layer_names, quiet, read_layer
 from .parquet_files import read_parquet, write_parquet
 from .vector_columns import storable_columns
 from .wkb import geometries_of_wkb
@@ -170,7 +170,7 @@ def write_footprints(
     if footprints.building_ids is not None:
         columns["building_id"] = footprints.building_ids
     file = Path(path)
-    name = layer or file.stem
+    name = (layer or file.stem).encode(errors="backslashreplace").decode()  # names of files need not be UTF-8
     write_layers({name: (footprints.polygons, columns)}, file, crs=footprints.crs, overwrite=overwrite)
 
 
@@ -207,59 +207,47 @@ def write_layers(
             raise OutputError(
                 f"{file}: GeoJSON names a CRS by its EPSG code, and {known.name!r} has none: write a GeoPackage (.gpkg)"
             )
-    with whole_file(file, overwrite=overwrite) as scratch:
+    with whole_file(file, overwrite=overwrite) as scratch, plain_target(scratch) as plain:
         for number, (layer, (geometries, table)) in enumerate(layers.items()):
             columns = storable_columns(table, driver, file)
             if driver == "GPKG" and layer.lower().startswith(("gpkg", "sqlite")):
                 layer = f"layer_{layer}"
             if driver == "Parquet":
-                write_parquet(scratch, geometries, columns, crs)
+                write_parquet(plain, geometries, columns, crs)
             else:
-                _write_ogr(scratch, driver, layer, geometries, columns, crs, append=number > 0)
+                _write_ogr(plain, driver, layer, geometries, columns, crs, append=number > 0)
 
 
 def _read_ogr(
     file: Path, layer: str | None
 ) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None, list[Repair]]:
-    import pyogrio.raw
     from pyogrio.errors import DataLayerError, DataSourceError
 
     if not (file.is_dir() and file.suffix.lower() == ".gdb"):
         require_file(file, "a vector file, for instance .gpkg or .geojson")
     _refuse_cut_off(file)
-    try:
-        listed = pyogrio.list_layers(file)
-        names = [str(name) for name, kind in listed if kind is not None] or [str(name) for name in listed[:, 0]]
-        if layer is None and len(names) > 1:
-            raise InputError(
-                f"{file} has {len(names)} layers ({', '.join(names)}): name one as '{file}|layername={names[0]}'"
-            )
-        if layer is not None and layer not in names:
-            raise InputError(f"{file} has no layer {layer!r}{nearest_hint(layer, names)}; it has {', '.join(names)}")
-        with _quiet():
-            try:
-                meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0])
-            except UnicodeDecodeError:  # text that is not in the encoding which the file names: any byte is a letter
-                meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0], encoding="ISO-8859-1")
-            except ValueError:  # dates that do not exist: their columns are left out
-                info = pyogrio.read_info(file, layer=layer or names[0])
-                kept = [
-                    name
-                    for name, kind in zip(info["fields"], info["dtypes"], strict=True)
-                    if not str(kind).startswith("datetime")
-                ]
-                meta, _, wkb, fields = pyogrio.raw.read(file, layer=layer or names[0], columns=kept)
-    except (DataSourceError, DataLayerError) as error:
-        reason = " ".join(str(error).partition("; It might help")[0].split())
-        raise InputError(f"{file} cannot be read as a vector file: {reason}") from error
-    if wkb is None:
+    with plain_path(file) as path:
+        try:
+            names = layer_names(path)
+            if layer is None and len(names) > 1:
+                raise InputError(
+                    f"{file} has {len(names)} layers ({', '.join(names)}): name one as '{file}|layername={names[0]}'"
+                )
+            if layer is not None and layer not in names:
+                raise InputError(
+                    f"{file} has no layer {layer!r}{nearest_hint(layer, names)}; it has {', '.join(names)}"
+                )
+            found = read_layer(path, layer or names[0])
+        except (DataSourceError, DataLayerError) as error:
+            reason = " ".join(str(error).partition("; It might help")[0].replace(str(path), str(file)).split())
+            raise InputError(f"{file} cannot be read as a vector file: {reason}") from error
+    if found.wkb is None:
         raise InputError(f"{file}: no polygons: the layer {layer or names[0]!r} has no geometry")
-    columns = dict(zip(map(str, meta["fields"]), fields, strict=True))
+    columns = dict(found.columns)
     if file.suffix.lower() == ".shp" and "building_i" in columns:
         columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name
-    geometries, closed = geometries_of_wkb(wkb, file)
-    crs = None if meta["crs"] is None else _named_or_none(meta["crs"])
-    return geometries, columns, crs, closed
+    geometries, closed = geometries_of_wkb(found.wkb, file)
+    return geometries, columns, None if found.crs is None else _named_or_none(found.crs), closed
 
 
 def _named_or_none(crs: str) -> str | None:
@@ -281,14 +269,6 @@ def _refuse_cut_off(file: Path) -> None:
         )
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Suppress GDAL's warnings about what is intended (no CRS, short names, NaN in JSON)."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
-
-
 def _write_ogr(
     file: Path,
     driver: str,
@@ -308,7 +288,7 @@ def _write_ogr(
     # A GeoPackage stores when it was written; a fixed date makes equal content equal bytes, which scenes rely on.
     pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": "2000-01-01T00:00:00.000Z"})
     try:
-        with _quiet():
+        with quiet():
             pyogrio.raw.write(
                 file,
                 geometry=shapely.to_wkb(geometries, flavor="iso"),

@@ -1,7 +1,12 @@
-"""Geometries of WKB, as files store them; rings that are not closed are closed and reported."""
+"""Geometries of WKB, as files store them.
+
+Rings that are not closed are closed and reported. Surfaces (TIN, triangle, polyhedral surface), which GEOS does not
+know, become polygons by their type codes alone: ISO 19125-1 gives both the same layout of rings.
+"""
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +18,13 @@ from .footprints import Repair
 
 __all__ = ["geometries_of_wkb"]
 
+#: Code of a surface to that of the geometry with the same layout: polyhedral surface, TIN, triangle.
+_SURFACES = {15: 6, 16: 6, 17: 3}
+#: Codes of geometries that consist of geometries: multipoint to collection, polyhedral surface, TIN.
+_COLLECTIONS = (4, 5, 6, 7, 15, 16)
+#: Deepest nesting of collections that is followed.
+_DEEPEST = 200
+
 
 def geometries_of_wkb(wkb: NDArray[np.object_], file: Path) -> tuple[NDArray[np.object_], list[Repair]]:
     """Return geometries of WKB; rings that end elsewhere than they began are closed and reported."""
@@ -21,11 +33,53 @@ def geometries_of_wkb(wkb: NDArray[np.object_], file: Path) -> tuple[NDArray[np.
         geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
         unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
         for row in unread:
-            geometries[row] = shapely.from_wkb(wkb[row], on_invalid="fix")
+            polygons = _with_polygons(bytes(wkb[row]))
+            geometries[row] = shapely.from_wkb(polygons, on_invalid="ignore")
+            if geometries[row] is not None:
+                continue
+            geometries[row] = shapely.from_wkb(polygons, on_invalid="fix")
             if geometries[row] is None:
                 raise InputError(
-                    f"{file}: the geometry of feature {row} is damaged, or a surface of triangles (multipatch, TIN): "
-                    "copy the file again, or convert it, for instance with ogr2ogr -nlt MULTIPOLYGON"
+                    f"{file}: the geometry of feature {row} is damaged, or a surface (multipatch, TIN) that cannot be "
+                    "read: copy the file again, or convert it, for instance with ogr2ogr -nlt MULTIPOLYGON"
                 )
             closed.append(Repair(int(row), "a ring that is not closed", "repaired"))
     return geometries, closed
+
+
+def _with_polygons(wkb: bytes) -> bytes:
+    """Return WKB in which surfaces are polygons; bytes that are no WKB are returned as they are."""
+    changed = bytearray(wkb)
+    try:
+        _rewrite(changed, 0, 0)
+    except (struct.error, ValueError):
+        return wkb
+    return bytes(changed)
+
+
+def _rewrite(wkb: bytearray, start: int, depth: int) -> int:
+    """Rewrite the geometry at `start` in place and return where it ends."""
+    if depth > _DEEPEST:
+        raise ValueError("nested too deeply")
+    order = "<" if wkb[start] == 1 else ">"
+    (code,) = struct.unpack_from(f"{order}I", wkb, start + 1)
+    kind, iso = (code & 0x0FFFFFFF) % 1000, (code & 0x0FFFFFFF) // 1000
+    axes = 2 + bool(code & 0x80000000 or iso in (1, 3)) + bool(code & 0x40000000 or iso in (2, 3))
+    struct.pack_into(f"{order}I", wkb, start + 1, code - kind + _SURFACES.get(kind, kind))
+    position = start + (9 if code & 0x20000000 else 5)
+    if kind == 1:
+        return position + 8 * axes
+    (count,) = struct.unpack_from(f"{order}I", wkb, position)
+    position += 4
+    if kind in _COLLECTIONS:
+        for _ in range(count):
+            position = _rewrite(wkb, position, depth + 1)
+    elif kind == 2:
+        position += 8 * axes * count
+    elif kind in (3, 17):
+        for _ in range(count):
+            (points,) = struct.unpack_from(f"{order}I", wkb, position)
+            position += 4 + 8 * axes * points
+    else:
+        raise ValueError(f"geometry type {kind}")
+    return position

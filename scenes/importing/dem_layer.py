@@ -57,8 +57,11 @@ def dem_of(place: Place, models: Sequence[RasterHeader], cell: float | None, poi
     return dem
 
 
-def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_filter: str | None) -> Elevation:
-    """Return the bare earth that the points give: of those classified as ground, else by a ground filter."""
+def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_filter: str | None) -> Elevation | None:
+    """Return the bare earth that the points give: of those classified as ground, else by a ground filter.
+
+    None where so few points give no height at all.
+    """
     from ..ground.filter import elevation_from_points, ground_surface
 
     check_size(place, cell or 1.0, "dem_cell")
@@ -75,6 +78,9 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
         dem = ground_surface(points, place.extent, cell=cell)
         why = ", since no point is classified as ground" if ground_filter is None else ""
         how = f"by a ground filter (progressive opening){why}"
+    if not np.isfinite(dem.values).any():
+        place.log.note(f"no DEM was derived: {len(points)} points are too few or lie too closely together")
+        return None
     how = place.log.derived["dem"] = f"{how}, at {dem.grid.gsd:g} m"
     place.log.note(f"the DEM was derived {how}")
     return dem

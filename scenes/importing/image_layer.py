@@ -25,11 +25,16 @@ def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, ba
         sentence = assumed_bands(header, bands)
         if sentence:
             place.log.note(sentence)
-    image = mosaic_image(images, grid, crs=place.crs, bands=bands)
+    image = mosaic_image(images, grid, crs=place.crs, bands=bands, note=place.log.note)
     if bands is None and (marked := [header.path for header in images if looks_like_values(header)]):
         place.log.note(
             f"{file_names(marked)}: the last band is marked as alpha and was taken for the mask, but holds many "
             "values: if it is near infrared, name the bands: red,green,blue,nir"
+        )
+    if bands is None and (masked := [header.path for header in images if header.mask_band]):
+        place.log.note(
+            f"{file_names(masked)}: the fourth band holds 0 and one other value and was taken for the mask: if it is "
+            "near infrared, name the bands: red,green,blue,nir"
         )
     if image.valid is not None and not image.valid.any():
         raise InputError(

@@ -147,9 +147,8 @@ def test_systems_that_cannot_be_named(crs, evaluate):
     assert evaluate(collection(POLYGON, crs=None), "--crs", crs).code == 2
 
 
-GDAL_READS_ANOTHER = pytest.mark.xfail(strict=True, reason="pyogrio takes ! for an archive and drops line ends")
 NAMES = ["a b.geojson", "ä€.geojson", "<script>.geojson", "-x.geojson", "a|b.geojson"]
-NAMES += [pytest.param(name, marks=GDAL_READS_ANOTHER) for name in ("a!b.geojson", "a\nb.geojson")]
+NAMES += ["a!b.geojson", "a\nb.geojson", "a;b.geojson", "zip:a.geojson", " a.geojson", "a?b#c.geojson"]
 NAMES += ["%s.geojson", "a'b\".geojson", "[1].geojson", "x" * 240 + ".geojson"]
 
 

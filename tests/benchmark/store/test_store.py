@@ -254,3 +254,13 @@ def test_a_store_in_a_folder_that_cannot_be_written_is_read(tmp_path, monkeypatc
     with pytest.raises(sqlite3.OperationalError, match="readonly"):
         db.execute("CREATE TABLE more (id)")
     db.close()
+
+
+def test_texts_of_a_plugin_that_are_not_utf_8_are_escaped():
+    """File names that are not UTF-8 hold lone surrogates, which no file can store."""
+    outcome = Outcome(
+        status="failed", reason="no file a\udcff.tif", metadata={"files": ["b\udcfe"]}, attributes={"name": ["ü\ud800"]}
+    )
+    assert outcome.reason == "no file a\\udcff.tif"
+    assert outcome.metadata == {"files": ["b\\udcfe"]}
+    assert outcome.attributes == {"name": ["ü\\ud800"]}

@@ -7,6 +7,7 @@ from rasterio import Affine
 from rasterio.enums import ColorInterp
 from rasterio.warp import transform as transform_points
 
+from roofbench.core.errors import InputError
 from roofbench.scenes.geodata.raster import Grid
 from roofbench.scenes.geodata.raster_files import assumed_bands, band_names, read_image, read_raster_header
 from roofbench.scenes.geodata.raster_mosaic import mosaic_elevation, mosaic_image
@@ -108,3 +109,58 @@ def test_bands_are_named_by_the_colours_of_the_file_and_what_is_assumed_is_noted
     assert band_names(header, None) == names
     assert (note is None and assumed_bands(header, None) is None) or note in assumed_bands(header, None)
     assert assumed_bands(header, names) is None
+
+
+def as_mask(path, values):
+    """Replace the fourth band of a raster."""
+    with rasterio.open(path, "r+") as target:
+        target.write(values.astype(target.dtypes[3]), 4)
+    return read_raster_header(path)
+
+
+@pytest.mark.parametrize(("dtype", "high"), [("uint8", 255), ("uint8", 1), ("uint16", 65535)])
+def test_a_fourth_band_of_two_values_is_a_mask_and_no_infrared(tmp_path, dtype, high):
+    raster(tmp_path / "a.tif", dtype=dtype)
+    header = as_mask(tmp_path / "a.tif", np.where(upper_quarter_empty(), high, 0))
+    assert (header.band_count, header.mask_band) == (3, True)
+    for image in (read_image(header.path), mosaic_image([header], GRID, crs="EPSG:25832")):
+        assert image.bands == ("red", "green", "blue")
+        assert (image.valid == upper_quarter_empty()).all()
+    named = ("red", "green", "blue", "nir")
+    assert read_image(header.path, bands=named).bands == named
+
+
+def test_a_fourth_band_of_many_values_is_infrared(tmp_path):
+    raster(tmp_path / "a.tif")
+    header = as_mask(tmp_path / "a.tif", np.arange(6400).reshape(80, 80) % 200)
+    assert band_names(header, None) == ("red", "green", "blue", "nir")
+
+
+def test_two_images_of_one_place_are_refused_when_they_differ(tmp_path):
+    rgb = raster(tmp_path / "rgb.tif", levels=(90, 110, 70))
+    cir = raster(tmp_path / "cir.tif", levels=(200, 90, 110))
+    with pytest.raises(InputError, match=r"cir\.tif shows the same place .* if one is infrared"):
+        mosaic_image([rgb, cir], GRID, crs="EPSG:25832")
+
+
+def test_an_image_that_others_cover_with_equal_values_is_reported(tmp_path):
+    one = raster(tmp_path / "one.tif", levels=(90, 110, 70))
+    two = raster(tmp_path / "two.tif", levels=(91, 110, 70))
+    notes = []
+    assert mosaic_image([one, two], GRID, crs="EPSG:25832", note=notes.append).values[0, 0, 0] == 90
+    assert notes == ["two.tif is not used: other images have data in all of its cells"]
+
+
+def test_neighbours_that_share_a_margin_are_not_reported(tmp_path):
+    one = raster(tmp_path / "one.tif", levels=(90, 110, 70))
+    two = raster(tmp_path / "two.tif", levels=(200, 90, 110), corner=(WEST + 30, NORTH))
+    notes = []
+    mosaic_image([one, two], Grid(WEST, NORTH, 0.5, 80, 140), crs="EPSG:25832", note=notes.append)
+    assert notes == []
+
+
+@pytest.mark.parametrize("name", ["a!b.tif", "a\nb.tif", "a;b.tif", "a\udcff.tif"])
+def test_rasters_may_have_any_name(tmp_path, name):
+    raster(tmp_path / "a.tif")
+    (tmp_path / "a.tif").rename(tmp_path / name)
+    assert read_image(tmp_path / name).values.shape == (4, 80, 80)

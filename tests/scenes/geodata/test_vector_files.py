@@ -1,5 +1,8 @@
+import contextlib
 import json
 import shutil
+import sqlite3
+import struct
 
 import numpy as np
 import pandas as pd
@@ -11,6 +14,7 @@ from shapely import MultiPolygon, box
 import roofbench as rb
 from roofbench.core.errors import CRSError, InputError, OutputError
 from roofbench.scenes.geodata.vector_files import split_layer, write_layers
+from roofbench.scenes.geodata.wkb import geometries_of_wkb
 
 ENDINGS = ("geojson", "json", "gpkg", "shp", "fgb", "parquet", "geoparquet")
 CRS = "EPSG:28992"
@@ -375,3 +379,90 @@ def test_geojson_in_metres_with_heights_and_without_a_crs_is_read(tmp_path):
     found = rb.read_footprints(file)
     assert found.crs is None
     assert found.areas == pytest.approx([50.0])
+
+
+# Names that GDAL's wrappers would change
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("name", ["a!b", "a\nb", "a;b", "zip:a", " a", "a\udcff"])
+def test_files_and_folders_of_any_name_are_written_and_read_where_they_are(tmp_path, monkeypatch, ending, name):
+    folder = tmp_path / f"folder {name}"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    footprints = rb.Footprints.of(SQUARES, crs=CRS, building_ids=["x", "y", "x"])
+    for path in (f"{name}.{ending}", folder / f"second {name}.{ending}"):
+        after = there_and_back(footprints, path)
+        assert shapely.equals(after.polygons, footprints.polygons).all()
+        assert after.building_ids.tolist() == ["x", "y", "x"]
+    stems = {item.name.partition(f"{name}.")[0] for item in folder.iterdir()}
+    assert stems == {"", "second "}
+
+
+# Geometry types that pyogrio or GEOS do not name
+
+
+@pytest.mark.parametrize(("z", "m"), [(1, 0), (0, 1), (1, 1), (2, 2)])
+def test_a_layer_of_any_geometry_with_heights_or_measures_is_read(tmp_path, z, m):
+    path = tmp_path / "any.gpkg"
+    rb.write_footprints(rb.Footprints.of(SQUARES, crs=CRS, building_ids=[3, 3, 4]), path)
+    with contextlib.closing(sqlite3.connect(path)) as db:
+        db.execute("UPDATE gpkg_geometry_columns SET geometry_type_name = 'GEOMETRY', z = ?, m = ?", (z, m))
+        db.commit()
+    after = rb.read_footprints(path)
+    assert shapely.equals(after.polygons, SQUARES).all()
+    assert (after.crs, after.building_ids.tolist()) == (CRS, [3, 3, 4])
+
+
+def surface(code, faces, *, order="<", axes=3):
+    """WKB of a surface of triangles; `faces` are arrays of closed rings."""
+    mark = struct.pack("B", order == "<")
+    face = {1016: 1017, 1015: 1003}[code]
+    parts = [
+        mark + struct.pack(f"{order}III", face, 1, len(ring)) + struct.pack(f"{order}{3 * len(ring)}d", *ring.ravel())
+        for ring in faces
+    ]
+    return mark + struct.pack(f"{order}II", code, len(parts)) + b"".join(parts)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("code", [1015, 1016], ids=["polyhedral surface", "TIN"])
+def test_the_footprint_of_a_surface_is_the_union_of_its_faces(tmp_path, code, order):
+    a, b, c, d = ([85000.0 + x, 447000.0 + y, 5.0] for x, y in ((0, 0), (10, 0), (10, 8), (0, 8)))
+    low = [85000.0, 447000.0, 0.0]
+    faces = [np.array(ring) for ring in ([a, b, c, a], [a, c, d, a], [low, a, d, low])]  # the last one is a wall
+    single = surface(code, faces, order=order)
+    nested = struct.pack("<BII", 1, 1007, 1) + struct.pack("<BII", 1, 1007, 1) + single
+    geometries, closed = geometries_of_wkb(np.array([single, nested], dtype=object), tmp_path / "a.shp")
+    footprints = rb.Footprints.of(geometries)
+    assert closed == []
+    assert footprints.areas == pytest.approx([80.0, 80.0])
+
+
+def test_collections_nested_to_any_depth_keep_their_polygons():
+    geometry = SQUARES[0]
+    for _ in range(5):
+        geometry = shapely.GeometryCollection([geometry])
+    mixed = shapely.GeometryCollection([geometry, shapely.MultiPolygon(SQUARES[1:]), shapely.Point(85000, 447000)])
+    footprints = rb.Footprints.of([geometry, shapely.GeometryCollection([mixed])])
+    assert footprints.areas.tolist() == [100.0, 300.0]
+
+
+def test_an_impossible_date_loses_its_own_value_only(tmp_path):
+    path = tmp_path / "dates.shp"
+    dates = np.array(["2020-01-01", "2020-01-02", "2020-01-03"], dtype="datetime64[D]")
+    rb.write_footprints(rb.Footprints.of(SQUARES, crs=CRS, attributes={"built": dates, "n": [7, 8, 9]}), path)
+    table = path.with_suffix(".dbf")
+    content = table.read_bytes()
+    place = content.index(b"20200102")
+    table.write_bytes(content[:place] + b"20201345" + content[place + 8 :])
+    attributes = rb.read_footprints(path).attributes
+    assert attributes["n"].tolist() == [7, 8, 9]
+    assert attributes["built"].astype("datetime64[D]").astype(str).tolist() == ["2020-01-01", "NaT", "2020-01-03"]
+
+
+def test_a_text_of_another_encoding_changes_no_other_text(tmp_path):
+    path = tmp_path / "names.gpkg"
+    rb.write_footprints(rb.Footprints.of(SQUARES, crs=CRS, attributes={"name": ["Bühne", "K_nig", "x"]}), path)
+    path.write_bytes(path.read_bytes().replace(b"K_nig", b"K\xf6nig"))
+    assert rb.read_footprints(path).attributes["name"].tolist() == ["Bühne", "König", "x"]

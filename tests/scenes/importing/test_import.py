@@ -713,3 +713,18 @@ def test_a_window_and_chunks_give_the_same_points_as_the_whole(tmp_path, monkeyp
     truth = cloud.take(inside)
     for column in ("x", "y", "z", "return_number", "number_of_returns", "intensity", "classification", "colour"):
         np.testing.assert_allclose(getattr(part, column), getattr(truth, column), rtol=1e-15)
+
+
+FEW = {"one point": 1, "two points": 2, "one place": 5, "a line": 10}
+
+
+@pytest.mark.parametrize("kind", FEW)
+def test_check_accepts_what_import_wrote_of_few_points(files, bring, kind):
+    count = FEW[kind]
+    along = np.zeros(count) if kind == "one place" else np.arange(count, dtype=float)
+    cloud = rb.PointCloud(x=WEST + along, y=np.full(count, SOUTH), z=np.full(count, 100.0))
+    write_points(cloud, files / "few.laz", crs=CRS)
+    code, _, err = bring("few.laz")
+    assert code == 0, err
+    code, _, err = run("scenes", "check", "out")
+    assert code == 0, err
