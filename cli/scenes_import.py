@@ -26,13 +26,25 @@ def import_(
         list[str] | None,
         typer.Option("--points", metavar="FILE", help="LAS, LAZ or COPC file or pattern; repeat for more."),
     ] = None,
+    dsm: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--dsm", metavar="FILE", help="Digital surface model instead of points, one point a cell; repeat for more."
+        ),
+    ] = None,
     ortho: Annotated[
         list[str] | None,
         typer.Option("--ortho", metavar="FILE", help="Orthoimage or pattern; repeat for more, which are mosaicked."),
     ] = None,
+    nir: Annotated[
+        list[str] | None,
+        typer.Option("--nir", metavar="FILE", help="Near infrared of the orthoimage as a file of its own, one band."),
+    ] = None,
     dem: Annotated[
         list[str] | None,
-        typer.Option("--dem", metavar="FILE", help="Bare-earth elevation; derived from the points by default."),
+        typer.Option(
+            "--dem", "--dtm", metavar="FILE", help="Bare-earth elevation; derived from the points by default."
+        ),
     ] = None,
     reference: Annotated[
         str | None,
@@ -117,6 +129,8 @@ def import_(
     request = ImportRequest(
         points=[*expanded(points or ()), *loose_points],
         ortho=[*expanded(ortho or ()), *loose_images],
+        dsm=expanded(dsm or ()),
+        nir=expanded(nir or ()),
         dem=expanded(dem or ()),
         reference=reference,
         area=area,

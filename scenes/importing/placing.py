@@ -1,7 +1,7 @@
 """Decide the place of a scene: its CRS and its extent.
 
-The CRS is the one that was given, else that of the points, else that of the first image without points. The extent is
-what points and images have in common, cut to the extent that was asked for.
+The CRS is the one that was given, else that of the points, else that of the first surface model, else of the first
+image. The extent is what points or surface models and images have in common, cut to the extent that was asked for.
 """
 
 from __future__ import annotations
@@ -24,9 +24,13 @@ __all__ = ["assign_crs", "decide_place"]
 
 
 def decide_place(
-    request: ImportRequest, clouds: Sequence[LasHeader], images: Sequence[RasterHeader], log: ImportLog
-) -> tuple[Place, list[RasterHeader]]:
-    """Return the place, and the images with a CRS each.
+    request: ImportRequest,
+    clouds: Sequence[LasHeader],
+    surfaces: Sequence[RasterHeader],
+    images: Sequence[RasterHeader],
+    log: ImportLog,
+) -> tuple[Place, list[RasterHeader], list[RasterHeader]]:
+    """Return the place, and surface models and images with a CRS each.
 
     Raises
     ------
@@ -35,14 +39,16 @@ def decide_place(
     InputError
         The inputs have no place in common.
     """
-    crs = _decide_crs(request.crs, clouds, images, log)
-    assigned = assign_crs(images, crs, log)
-    place = Place(crs, _decide_extent(request.wanted_extent, crs, clouds, assigned, log), log)
+    crs = _decide_crs(request.crs, clouds, [*surfaces, *images], log)
+    models, assigned = assign_crs(surfaces, crs, log), assign_crs(images, crs, log)
+    parts = [*_extent_of_points(clouds), *_extent_of_rasters(models, crs, "surface model")]
+    parts += _extent_of_rasters(assigned, crs, "image")
+    place = Place(crs, _decide_extent(request.wanted_extent, parts, log), log)
     xmin, ymin, xmax, ymax = place.extent
     stretched = scale_warning(crs, (xmin + xmax) / 2, (ymin + ymax) / 2)
     if stretched:
         log.note(stretched)
-    return place, assigned
+    return place, models, assigned
 
 
 def assign_crs(headers: Sequence[RasterHeader], crs: str, log: ImportLog) -> list[RasterHeader]:
@@ -85,19 +91,28 @@ def _decide_crs(given: str | None, clouds: Sequence[LasHeader], images: Sequence
     return crs
 
 
-def _decide_extent(
-    wanted: Extent | None, crs: str, clouds: Sequence[LasHeader], images: Sequence[RasterHeader], log: ImportLog
-) -> Extent:
-    parts: list[tuple[str, Extent]] = []
-    if clouds:
-        corners = np.array([cloud.bounds for cloud in clouds])
-        low, high = np.floor(corners[:, :2].min(axis=0)), np.ceil(corners[:, 3:5].max(axis=0))
-        high = np.maximum(high, low + 1)
-        parts.append((f"{file_paths([c.path for c in clouds])} (points)", (*low.tolist(), *high.tolist())))
-    if images:
-        corners = np.array([warped_extent(image, crs) for image in images])
-        shown = (*corners[:, :2].min(axis=0).tolist(), *corners[:, 2:].max(axis=0).tolist())
-        parts.append((f"{file_paths([i.path for i in images])} (image)", shown))
+def _extent_of_points(clouds: Sequence[LasHeader]) -> list[tuple[str, Extent]]:
+    """Return the bounds of all point files, rounded outwards to metres, with their name; empty without any."""
+    if not clouds:
+        return []
+    corners = np.array([cloud.bounds for cloud in clouds])
+    low, high = np.floor(corners[:, :2].min(axis=0)), np.ceil(corners[:, 3:5].max(axis=0))
+    high = np.maximum(high, low + 1)
+    return [(f"{file_paths([cloud.path for cloud in clouds])} (points)", (*low.tolist(), *high.tolist()))]
+
+
+def _extent_of_rasters(headers: Sequence[RasterHeader], crs: str, what: str) -> list[tuple[str, Extent]]:
+    """Return the bounds of all rasters of a layer with their name; empty without any."""
+    if not headers:
+        return []
+    corners = np.array([warped_extent(header, crs) for header in headers])
+    bounds = (*corners[:, :2].min(axis=0).tolist(), *corners[:, 2:].max(axis=0).tolist())
+    return [(f"{file_paths([header.path for header in headers])} ({what})", bounds)]
+
+
+def _decide_extent(wanted: Extent | None, parts: list[tuple[str, Extent]], log: ImportLog) -> Extent:
+    """Return what all parts and the extent that was asked for have in common."""
+    layers = len(parts)
     if wanted is not None:
         parts.append(("the extent asked for", wanted))
     where, extent = parts[0]
@@ -111,8 +126,9 @@ def _decide_extent(
         extent = common
     if wanted is not None and extent != wanted:
         log.note(f"the extent asked for was cut to {extent_text(extent)}, where there are data")
-    elif len(parts) == 2 and clouds and images and extent != parts[0][1]:
-        log.note(f"points and image have {extent_text(extent)} in common; what lies outside was left out")
+    elif layers == 2 and wanted is None and extent != parts[0][1]:
+        heights = "points" if parts[0][0].endswith("(points)") else "surface model"
+        log.note(f"{heights} and image have {extent_text(extent)} in common; what lies outside was left out")
     return extent
 
 

@@ -26,8 +26,12 @@ class ImportRequest:
     ----------
     points : path or sequence of path
         LAS, LAZ or COPC files in one projected CRS in metres.
+    dsm : path or sequence of path
+        Digital surface models (DSM, GeoTIFF) instead of points: each cell with a height becomes a point.
     ortho : path or sequence of path
         Orthoimages (GeoTIFF), mosaicked; those in another CRS or of another cell size are resampled.
+    nir : path or sequence of path
+        Near-infrared images of one band that show the place of `ortho`: its band ``nir``.
     dem : path or sequence of path
         Bare-earth elevation (GeoTIFF), its gaps interpolated. Without it, the DEM is derived: from points of classes 2
         (ground) and 9 (water), else by a ground filter.
@@ -67,7 +71,9 @@ class ImportRequest:
     """
 
     points: _Paths = ()
+    dsm: _Paths = ()
     ortho: _Paths = ()
+    nir: _Paths = ()
     dem: _Paths = ()
     reference: _Path | None = None
     area: _Path | None = None
@@ -104,6 +110,16 @@ class ImportRequest:
         return _paths(self.points)
 
     @property
+    def surface_files(self) -> tuple[Path, ...]:
+        """Surface models; none of them twice."""
+        return _paths(self.dsm)
+
+    @property
+    def infrared_files(self) -> tuple[Path, ...]:
+        """Infrared images; none of them twice."""
+        return _paths(self.nir)
+
+    @property
     def image_files(self) -> tuple[Path, ...]:
         """Orthoimages; none of them twice."""
         return _paths(self.ortho)
@@ -121,8 +137,12 @@ class ImportRequest:
     def _check_inputs(self) -> None:
         """Refuse options that exclude each other or lack their input."""
         points, ortho, dem = self.point_files, self.image_files, self.dem_files
-        if not points and not ortho:
-            raise ParameterError("a scene needs points or an orthoimage: give points= or ortho=")
+        if not points and not ortho and not self.surface_files:
+            raise ParameterError("a scene needs points, a surface model or an orthoimage: give points=, dsm= or ortho=")
+        if points and self.surface_files:
+            raise ParameterError("give points= or dsm=, not both: a surface model takes the place of points")
+        if self.infrared_files and not ortho:
+            raise ParameterError("nir= is a band of an orthoimage: give ortho=")
         for given, file, derived, option in (
             (self.reference, "reference", self.reference_from_class, "reference_from_class"),
             (ortho, "ortho", self.ortho_from_points, "ortho_from_points"),

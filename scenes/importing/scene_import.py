@@ -28,18 +28,22 @@ from ..scene import Scene
 from .area_layer import area_of_extent, read_area
 from .dem_layer import dem_of, dem_of_points
 from .image_layer import image_of, image_of_points
+from .infrared_layer import with_infrared
 from .place import ImportLog, Place
 from .placing import assign_crs, decide_place
 from .point_layer import points_of
 from .reference_layer import blocks_of, read_reference, rectangles_of, reference_of_class
 from .request import ImportRequest
+from .surface_layer import points_of_surface
 
 __all__ = ["import_scene"]
 
 
 class _Headers(NamedTuple):
     clouds: list[LasHeader]
+    surfaces: list[RasterHeader]
     images: list[RasterHeader]
+    infrared: list[RasterHeader]
     models: list[RasterHeader]
 
 
@@ -86,15 +90,21 @@ def import_scene(
     log = ImportLog(note)
     clouds = [read_las_header(file, fallback=request.crs) for file in request.point_files]
     images = [read_raster_header(file) for file in request.image_files]
-    models = [read_raster_header(file) for file in request.dem_files]
+    surfaces, infrared, models = (
+        [read_raster_header(file) for file in files]
+        for files in (request.surface_files, request.infrared_files, request.dem_files)
+    )
     for image in images:
         band_names(image, request.bands)
-    place, images = decide_place(request, clouds, images, log)
-    headers = _Headers(clouds, images, assign_crs(models, place.crs, log))
+    place, surfaces, images = decide_place(request, clouds, surfaces, images, log)
+    infrared, models = assign_crs(infrared, place.crs, log), assign_crs(models, place.crs, log)
+    headers = _Headers(clouds, surfaces, images, infrared, models)
 
     # Small files first: an error in them is reported before the long reading of points.
     reference, area = _read_vectors(request, place)
     cloud = points_of(place, clouds, progress) if clouds else None
+    if surfaces:
+        cloud = points_of_surface(place, surfaces)
     picture = _image(request, place, headers, cloud)
     dem = _dem(request, place, headers, cloud)
     reference = _finished_reference(request, place, cloud, reference)
@@ -127,7 +137,10 @@ def _read_vectors(request: ImportRequest, place: Place) -> tuple[Footprints | No
 def _image(request: ImportRequest, place: Place, headers: _Headers, cloud: PointCloud | None) -> Image | None:
     if cloud is not None and request.ortho_from_points:
         return image_of_points(place, cloud, request.gsd, request.point_files)
-    return image_of(place, headers.images, request.gsd, request.bands) if headers.images else None
+    if not headers.images:
+        return None
+    image = image_of(place, headers.images, request.gsd, request.bands)
+    return with_infrared(place, image, headers.infrared) if headers.infrared else image
 
 
 def _dem(request: ImportRequest, place: Place, headers: _Headers, cloud: PointCloud | None) -> Elevation | None:
