@@ -19,6 +19,7 @@ import typer.core
 
 from ..core.errors import ParameterError, RoofbenchError
 from .options import (
+    DEFAULT_JOBS,
     DEFAULT_STORE,
     JobsOption,
     MemoryLimitOption,
@@ -149,7 +150,7 @@ class RunOptions:
     The fields are the options, see `with_run_options`.
     """
 
-    jobs: JobsOption = 1
+    jobs: JobsOption = DEFAULT_JOBS
     memory_limit: MemoryLimitOption = None
     plugin: PluginOption = None
     quiet: QuietOption = False

@@ -6,6 +6,7 @@ command line is parsed, by the name of its option.
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -16,6 +17,7 @@ from ..core.errors import ParameterError
 from . import completion
 
 __all__ = [
+    "DEFAULT_JOBS",
     "DEFAULT_STORE",
     "FORMAT_HELP",
     "INDEX_HELP",
@@ -56,6 +58,8 @@ __all__ = [
     "read_size",
 ]
 
+#: Two workers where there are two cores: kernels are compiled at the same time.
+DEFAULT_JOBS = min(2, os.cpu_count() or 1)
 DEFAULT_STORE = Path("roofbench.sqlite")
 FORMAT_HELP = "Output format."
 INDEX_HELP = "Index by key or symbol, such as pixel.quality or Q_lp"

@@ -27,7 +27,14 @@ from .options import (
 from .progress import run_progress
 
 if TYPE_CHECKING:
-    from ..benchmark.plan import Plan
+    from collections.abc import Sequence
+
+    from rich.console import Console
+
+    from ..benchmark.analysis.results import Leaderboard
+    from ..benchmark.plan import KeyedEvaluator, Plan
+    from ..benchmark.store.records import RunRow
+    from ..benchmark.store.writer import Store
 
 __all__ = ["run"]
 
@@ -46,6 +53,9 @@ def run(
             "--output", "-o", metavar="FOLDER", help="Folder for report.html, leaderboard.csv and leaderboard.md."
         ),
     ] = None,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Write no report.html, which is else in FOLDER or beside the store.")
+    ] = False,
     overwrite: OverwriteOption = False,
     index: IndexOption = None,
     form: FormatOption = "table",
@@ -70,12 +80,10 @@ def run(
     Exit code 3 when runs failed, 4 when nothing could be measured.
     """
     from ..benchmark.analysis.leaderboard import make_leaderboard, unsuccessful_runs
-    from ..benchmark.analysis.report_contents import fill_report
     from ..benchmark.execution.runner import run_plan
     from ..benchmark.plan import make_plan, plan_content, suite_from_content
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
-    from ..reports.html_report import write_report
     from ..reports.leaderboard_text import print_unsuccessful, show_leaderboards, write_leaderboards
 
     execution = options.execution()
@@ -107,24 +115,27 @@ def run(
             for keyed in plan.evaluators
         ]
         known = len(result.rows) - result.done
-        console.print(
-            f"{result.done} runs done, {known} stored before, {len(result.failed)} failed; store {options.store}"
-        )
+        console.print(f"{result.done} runs done, {known} stored before, {len(result.failed)} failed")
         if plan.left_out:
             console.print(
                 f"{len(plan.left_out)} runs of the suite are not stored and were left out: run without --retry-failed "
                 "to execute them"
             )
         # Files first: the reader of the table may close the pipe (head).
+        written = [options.store]
         if output is not None:
             write_leaderboards(output, boards)
-            if any(entry.scenes for board in boards for entry in board.entries):
-                evaluated = list(zip(plan.evaluators, boards, strict=True))
-                filled = fill_report(opened, result.rows, title=f"Suite {suite.name}", evaluated=evaluated)
-                write_report(filled, output / "report.html", overwrite=True)
+            written += [output / "leaderboard.csv", output / "leaderboard.md"]
+        if not no_report and any(entry.scenes for board in boards for entry in board.entries):
+            page = (output or options.store.parent) / "report.html"
+            evaluated = list(zip(plan.evaluators, boards, strict=True))
+            written += _write_report(page, opened, result.rows, suite.name, evaluated, console)
         show_leaderboards(boards, form, table_console(), wide=wide)
         unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
         print_unsuccessful([*unsuccessful_runs(result.rows), *unevaluated], console)
+        console.print(f"written: {', '.join(map(str, written))}", markup=False, soft_wrap=True)
+        following = "roofbench run --resume --retry-failed" if result.failed else "roofbench new detector my-detector"
+        console.print(f"next: {following}", markup=False, soft_wrap=True)
         if result.failed or unevaluated:
             raise typer.Exit(3)
         if not any(entry.scenes for board in boards for entry in board.entries):
@@ -151,6 +162,26 @@ def _print_plan(plan: Plan) -> None:
         *([f"{left_out} left out"] if left_out else []),
     ]
     typer.echo(f"{len(plan.runs)} runs: {', '.join(parts)}")
+
+
+def _write_report(
+    page: Path,
+    store: Store,
+    rows: Sequence[RunRow],
+    suite: str,
+    evaluated: list[tuple[KeyedEvaluator, Leaderboard]],
+    console: Console,
+) -> list[Path]:
+    """Write the report and return its path; a file of that name that is no report is left alone, with a message."""
+    from ..benchmark.analysis.report_contents import fill_report
+    from ..reports.html_report import is_report, write_report
+
+    if page.exists() and not is_report(page):
+        console.print(f"{page} is no report of roofbench and was not replaced: name a folder by --output", markup=False)
+        return []
+    filled = fill_report(store, rows, title=f"Suite {suite}", evaluated=evaluated)
+    write_report(filled, page, overwrite=True)
+    return [page]
 
 
 def _make_folder(folder: Path, overwrite: bool) -> None:

@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-__all__ = ["clean", "default_folder", "load", "remove", "save"]
+__all__ = ["clean", "default_folder", "load", "names", "remove", "save"]
 
 _SUFFIX = ".kernel"
 _CHECKSUM = 32  # bytes of a SHA-256
@@ -34,6 +34,17 @@ def default_folder() -> Path:
     """
     cache = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or os.path.expanduser("~/.cache")
     return Path(cache) / "roofbench" / "kernels"
+
+
+def names(folder: Path) -> list[str]:
+    """Return the names of the entries, the oldest first."""
+    found = []
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for item in entries:
+            if item.name.endswith(_SUFFIX):
+                with contextlib.suppress(OSError):  # another process may clean at the same time
+                    found.append((item.stat().st_mtime_ns, item.name.removesuffix(_SUFFIX)))
+    return [name for _, name in sorted(found)]
 
 
 def load(folder: Path, name: str) -> bytes | None:

@@ -33,12 +33,22 @@ from .overlay_json import report_json
 from .sensitivity import sensitivity_figure
 from .sweep_text import break_down_text
 
-__all__ = ["html_report", "write_report"]
+__all__ = ["html_report", "is_report", "write_report"]
 
 _MOST_MATRIX_ROWS = 300
 #: Panels in one sensitivity figure.
 _MOST_AXES = 12
+_GENERATOR = b'<meta name="generator" content="roofbench">'
 _SYMBOL = re.compile(r"\b([A-Z])_([a-z]{1,2})\b")
+
+
+def is_report(path: Path) -> bool:
+    """Return whether a file is a report of roofbench, which a new one may replace."""
+    try:
+        with path.open("rb") as file:
+            return _GENERATOR in file.read(4096)
+    except OSError:
+        return False
 
 
 def html_report(report: Report, *, level: float = 0.8) -> str:

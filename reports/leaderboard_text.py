@@ -47,6 +47,7 @@ _COSTS = ("detected", "reference", "cpu_seconds", "peak_memory")
 def summary_table(board: Leaderboard) -> Table:
     """Return the table with one line per detector: rank, group, the most important indices, median seconds of a run."""
     grouped = any(entry.group for entry in board.entries)
+    spread = _has_intervals(board)
     columns = [
         Column("rank", fixed=True),
         *([Column("group", "left", fixed=True)] if grouped else []),
@@ -54,7 +55,7 @@ def summary_table(board: Leaderboard) -> Table:
     ]
     for index in board.summary:
         columns.append(Column(column_title(index, words=True), head=column_head(index)))
-        if index == board.rank_by:
+        if index == board.rank_by and spread:
             columns.append(Column("95 %"))
     columns.append(Column("CPU s", head=("CPU", "s")))
     rows = []
@@ -65,7 +66,7 @@ def summary_table(board: Leaderboard) -> Table:
         for index in board.summary:
             cell = entry.cells[index.key]
             row.append(number_text(cell.value, index.unit))
-            if index == board.rank_by:
+            if index == board.rank_by and spread:
                 row.append(interval_text(cell.low, cell.high, index.unit, coarse=True))
         rows.append([*row, number_text(entry.cpu_seconds, "s")])
     return Table.of(columns, rows)
@@ -144,13 +145,17 @@ def leaderboard_caption(board: Leaderboard) -> str:
     )
 
 
+def _has_intervals(board: Leaderboard) -> bool:
+    return any(entry.cells[board.rank_by.key].low is not None for entry in board.entries)
+
+
 def summary_caption(board: Leaderboard) -> str:
     """Return what the values of the summary are of."""
     objects = max((entry.reference for entry in board.entries), default=0)
     return (
         f"{counted(len(board.scenes), 'scene')}, {counted(objects, 'reference footprint')}; {board.evaluator}; ranked "
-        f"by {index_name(board.rank_by)}; counts are added over scenes, then the ratio; 95 %: interval over resampled "
-        "scenes"
+        f"by {index_name(board.rank_by)}; counts are added over scenes, then the ratio"
+        + ("; 95 %: interval over resampled scenes" if _has_intervals(board) else "")
     )
 
 

@@ -311,3 +311,36 @@ def test_a_store_without_room_is_one_sentence(monkeypatch, tmp_path):
     monkeypatch.setattr("roofbench.benchmark.store.writer.Store.save_plan", full)
     printed = roofbench("run", "hamlet", "-d", "ndsm", "-j", 0, folder=tmp_path, expect=2).stderr
     assert printed == "Error: the results store cannot be written or read: database or disk is full\n"
+
+
+def test_run_writes_a_report_beside_the_store_and_names_its_files(cli, misbehaving, tmp_path):
+    answer = cli("run", "hamlet", "-d", misbehaving, "-j", 0)
+    assert answer.exit_code == 0
+    assert "written: roofbench.sqlite, report.html\nnext: roofbench " in answer.stderr
+    assert (tmp_path / "report.html").exists()
+
+
+def test_a_report_replaces_reports_only(cli, misbehaving, tmp_path):
+    (tmp_path / "report.html").write_text("<p>of somebody</p>")
+    answer = cli("run", "hamlet", "-d", misbehaving, "-j", 0)
+    assert "report.html is no report of roofbench and was not replaced" in answer.stderr
+    assert (tmp_path / "report.html").read_text() == "<p>of somebody</p>"
+    (tmp_path / "report.html").unlink()
+    cli("run", "hamlet", "-d", misbehaving, "-j", 0, "--no-report")
+    assert not (tmp_path / "report.html").exists()
+    for _ in range(2):
+        assert "written: roofbench.sqlite, report.html" in cli("run", "hamlet", "-d", misbehaving, "-j", 0).stderr
+
+
+@pytest.mark.parametrize("form", ["csv", "json"])
+def test_tables_for_programs_are_all_that_is_on_standard_output(cli, misbehaving, form):
+    run = cli("run", "hamlet", "-d", misbehaving, "-j", 0, "--format", form).stdout
+    swept = cli("sweep", misbehaving, "hamlet", "--vary", "side=7,9", "-j", 0, "--format", form).stdout
+    if form == "json":
+        (board,) = json.loads(run)["leaderboards"]
+        assert board["entries"][0]["detector"] == "misbehaving"
+        assert {row["side"] for row in json.loads(swept)} == {7, 9}
+    else:
+        assert run.startswith("rank,group,detector,")
+        assert "detector" in swept.splitlines()[0].split(",")
+        assert len(swept.splitlines()) > 2
