@@ -274,6 +274,11 @@ class _LayerFile:
             from .geodata.las_files import read_points
 
             return read_points(self.file, window=extent)
+        if self.kind in ("image", "dem") and extent is not None:
+            from .geodata.raster_files import read_raster_header
+
+            if read_raster_header(self.file).grid.part(extent) is None:
+                return None
         if self.kind == "image":
             from .geodata.raster_files import read_image
 

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from ...core.errors import InputError, UnsupportedError
 from .isolation import close_isolated
 
-__all__ = ["InProcess", "Slot", "cluster_slot", "local_slots"]
+__all__ = ["InProcess", "Slot", "cluster_slot", "local_slots", "slots_of"]
 
 T = TypeVar("T")
 
@@ -79,3 +79,18 @@ def cluster_slot(address: str) -> Iterator[Slot]:
         if not threads:
             raise InputError(f"the Dask scheduler at {address} has no workers: start one with 'dask worker {address}'")
         yield Slot(client.get_executor(pure=False), 2 * threads + _AHEAD)
+
+
+@contextmanager
+def slots_of(jobs: int, scheduler: str | None, tasks: int) -> Iterator[list[Slot]]:
+    """Yield where so many tasks run: a cluster, `jobs` processes, or with 0 jobs this process."""
+    if scheduler is not None:
+        if jobs == 0:
+            raise UnsupportedError("jobs=0 runs in this process and cannot be combined with a scheduler")
+        with cluster_slot(scheduler) as slot:
+            yield [slot]
+    elif jobs == 0:
+        yield [Slot(InProcess(), 1)]
+    else:
+        with local_slots(min(jobs, tasks)) as slots:
+            yield slots

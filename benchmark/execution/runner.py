@@ -5,11 +5,10 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ...core.errors import UnsupportedError
 from ...core.processes import Limits
 from ...scenes.scene import Scene
 from ..identity.provenance import code_version
@@ -20,7 +19,7 @@ from ..store.outcomes import Outcome, Score
 from ..store.records import RunRow
 from ..store.writer import Store
 from .dispatch import Dispatcher
-from .executors import InProcess, Slot, cluster_slot, local_slots
+from .executors import Slot, slots_of
 from .isolation import call_isolated
 from .tasks import Task
 from .worker import execute, score
@@ -150,7 +149,7 @@ def _outcomes(
     evaluators = tuple(keyed.recipe for keyed in plan.evaluators)
     codes = tuple(keyed.code for keyed in plan.evaluators)
     with ExitStack() as stack:
-        slots = stack.enter_context(_slots(execution, len(runs)))
+        slots = stack.enter_context(slots_of(execution.jobs, execution.scheduler, len(runs)))
         elsewhere = execution.jobs > 0 or execution.scheduler is not None
         scenes = _Scenes(stack, elsewhere=elsewhere)
         dispatcher, flying = Dispatcher(runs), dict[Future[bytes], tuple[PlannedRun, Slot]]()
@@ -227,17 +226,3 @@ class _Scenes:
                 self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="roofbench-")))
             self._spooled[id(scene)] = SceneRecipe.of_scene(scene, spooled=spool(scene, self._folder))
         return replace(self._spooled[id(scene)], name=scene.name)
-
-
-@contextmanager
-def _slots(execution: Execution, tasks: int) -> Iterator[list[Slot]]:
-    if execution.scheduler is not None:
-        if execution.jobs == 0:
-            raise UnsupportedError("jobs=0 runs in this process and cannot be combined with a scheduler")
-        with cluster_slot(execution.scheduler) as slot:
-            yield [slot]
-    elif execution.jobs == 0:
-        yield [Slot(InProcess(), 1)]
-    else:
-        with local_slots(min(execution.jobs, tasks)) as slots:
-            yield slots

@@ -7,12 +7,31 @@ of JSON.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Self
 
+from ...detectors.tiling import Tile
 from ..identity.recipes import PluginRecipe, SceneRecipe
 
-__all__ = ["Task"]
+__all__ = ["Task", "TilePart"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TilePart:
+    """The part of a scene that a task is about.
+
+    Attributes
+    ----------
+    tile : Tile
+    halo : float
+        Metres around it that the detector sees, too.
+    ground_cell : float, optional
+        Cell size of the ground filter, metres.
+    """
+
+    tile: Tile
+    halo: float
+    ground_cell: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +48,8 @@ class Task:
         Digest of the source of each evaluator, where the caller knows it.
     describe_scene : bool
         Whether the outcome should describe the scene and its reference, because they are not stored yet.
+    part : TilePart, optional
+        Detect on a tile instead of the whole scene, and keep what it owns.
     """
 
     scene: SceneRecipe
@@ -37,6 +58,7 @@ class Task:
     evaluators: tuple[PluginRecipe, ...]
     codes: tuple[str, ...] = ()
     describe_scene: bool = False
+    part: TilePart | None = None
 
     def to_json(self) -> str:
         """Return the task as text."""
@@ -48,6 +70,7 @@ class Task:
                 "evaluators": [recipe.to_dict(execution=True) for recipe in self.evaluators],
                 "codes": list(self.codes),
                 "describe_scene": self.describe_scene,
+                "part": None if self.part is None else asdict(self.part),
             }
         )
 
@@ -55,6 +78,7 @@ class Task:
     def from_json(cls, text: str) -> Self:
         """Return the task of a text that `to_json` made."""
         values = json.loads(text)
+        part = values["part"]
         return cls(
             scene=SceneRecipe.from_dict(values["scene"]),
             detector=PluginRecipe(**values["detector"]),
@@ -62,4 +86,5 @@ class Task:
             evaluators=tuple(PluginRecipe(**recipe) for recipe in values["evaluators"]),
             codes=tuple(values["codes"]),
             describe_scene=values["describe_scene"],
+            part=None if part is None else TilePart(**{**part, "tile": Tile(**part["tile"])}),
         )

@@ -22,6 +22,7 @@ from ...core.memory import highest_memory, reset_highest_memory
 from ...detectors.base import Detector
 from ...detectors.checks import checked_output
 from ...detectors.external.precomputed import Precomputed
+from ...detectors.tiling import owned, stream_of
 from ...evaluators.base import Evaluator
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
@@ -30,7 +31,7 @@ from ..identity.keys import digest, random_stream_entropy
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
 from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure, plain_value
 from .scene_picture import scene_picture
-from .tasks import Task
+from .tasks import Task, TilePart
 
 __all__ = ["detect", "execute", "execute_text", "machine_facts", "processor_time", "random_stream", "score"]
 
@@ -39,14 +40,17 @@ _scenes: OrderedDict[str, Scene] = OrderedDict()
 _KEPT_SCENES = 2
 
 
-def detect(scene: Scene, detector: Detector, *, seed: int = 0) -> Footprints:
-    """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector."""
+def detect(scene: Scene, detector: Detector, *, seed: int = 0, stream: np.random.Generator | None = None) -> Footprints:
+    """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector.
+
+    A part of a scene has a `stream` of its own.
+    """
     scene.require(detector.requires)
     visible = scene.for_detection()
     if type(detector) is Precomputed:  # no subclass: a plugin must not learn the name
         found = detector.footprints_of(scene.name, visible)
     else:
-        found = detector.detect(visible, random_stream(seed, scene, detector))
+        found = detector.detect(visible, random_stream(seed, scene, detector) if stream is None else stream)
     found = checked_output(found, scene, detector.name)
     # What was estimated for lack of a DEM goes where the footprints go: to the screen, the store, the caller.
     notes = [*found.metadata.get("notes", ()), *visible.notes]
@@ -101,13 +105,20 @@ def execute(
         if evaluators is None:
             evaluators = [recipe.evaluator() for recipe in task.evaluators]
         record = describe(scene) if task.describe_scene else None
+        whole = scene
+        if task.part is not None:
+            scene = _window(scene, task.part)
         lacking = scene.lacks(detector.requires)
         if lacking:
             return Outcome(status="skipped", reason=lacking, scene=record, machine=machine_facts())
         scene.for_detection()  # reads all inputs: the time of a detector is that of detection in memory
-        reset_highest_memory()
+        if task.part is None:
+            reset_highest_memory()  # that of a tile includes its reading
         started = _now()
-        found = detect(scene, detector, seed=task.seed)
+        if task.part is None:
+            found = detect(scene, detector, seed=task.seed)
+        else:
+            found = _detect_part(scene, detector, task.seed, task.part, whole.extent)
         cost = _cost_since(started)
         codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
     except MissingInputError as error:  # a program that this machine lacks
@@ -142,6 +153,23 @@ def execute(
         scores=tuple(result for result in results if isinstance(result, Score)),
         score_failures=tuple(result for result in results if isinstance(result, ScoreFailure)),
     )
+
+
+def _window(scene: Scene, part: TilePart) -> Scene:
+    window = scene.window(part.tile.core, part.halo)
+    window.ground_cell = part.ground_cell
+    return window
+
+
+def _detect_part(
+    scene: Scene, detector: Detector, seed: int, part: TilePart, whole: tuple[float, float, float, float]
+) -> Footprints:
+    """Return what a tile owns; the scene is its window, which may have no points."""
+    if scene.points is not None and len(scene.points) == 0:
+        found = Footprints.empty(crs=scene.crs)
+    else:
+        found = detect(scene, detector, stream=stream_of(seed, part.tile, detector))
+    return owned(found, part.tile, scene.extent, whole)
 
 
 def score(

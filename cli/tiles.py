@@ -1,0 +1,102 @@
+"""``roofbench detect --tile``: a detector over the tiles of a scene."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from .console import messages
+
+if TYPE_CHECKING:
+    from ..benchmark.execution.city import City, CityResult
+    from ..benchmark.identity.recipes import SceneRecipe
+    from ..benchmark.store.outcomes import Outcome
+    from ..detectors.base import Detector
+    from ..detectors.tiling import Tile
+    from .command import RunOptions
+
+__all__ = ["detect_tiles"]
+
+
+def detect_tiles(
+    recipe: SceneRecipe, detector: Detector, output: Path, city: City, options: RunOptions, *, overwrite: bool
+) -> None:
+    """Detect tile by tile, and report; exit code 3 when a tile failed."""
+    from ..benchmark.execution.city import detect_city
+
+    with _progress(options) as report:
+        result = detect_city(
+            recipe,
+            detector,
+            output,
+            city,
+            execution=options.execution(),
+            overwrite=overwrite,
+            progress=report,
+        )
+    if not options.quiet:
+        _say(result, output, recipe.name)
+    if result.failed:
+        for tile, reason in result.failed.items():
+            typer.echo(f"failed: tile {tile.label}: {reason}", err=True)
+        typer.echo(
+            f"{len(result.failed)} of {result.tiles} tiles failed and are missing in {output}: repair their files, and "
+            "give the same command with --overwrite, which computes these tiles alone",
+            err=True,
+        )
+        raise typer.Exit(3)
+
+
+def _say(result: CityResult, output: Path, name: str) -> None:
+    values = ", ".join(f"{key}={value:g}" for key, value in result.measured.parameters.items())
+    if values:
+        typer.echo(f"note: {name}: all tiles share {values}, measured on up to five of them", err=True)
+    seams = result.seams
+    if any(seams):
+        typer.echo(
+            f"note: {name}: at the seams {seams.doubles} double and {seams.cut} cut footprints were left out, "
+            f"{seams.joined} cut ones joined",
+            err=True,
+        )
+    if result.skipped:
+        first, reason = next(iter(result.skipped.items()))
+        typer.echo(f"note: {len(result.skipped)} tiles were skipped, the first at {first.label}: {reason}", err=True)
+    reused = f", {result.reused} of them finished before" if result.reused else ""
+    memory = f", at most {result.peak_memory / 1e6:.0f} MB in a worker" if result.peak_memory else ""
+    typer.echo(f"{output}: {result.footprints} footprints of {result.tiles} tiles{reused}{memory}", err=True)
+
+
+@contextmanager
+def _progress(options: RunOptions) -> Iterator[Callable[[int, int, Tile, Outcome], None] | None]:
+    """Yield a callback for finished tiles: a bar with the time left on a terminal, with verbose a line for each."""
+    screen = messages(options.quiet)
+    if options.quiet or not (screen.is_terminal or options.verbose):
+        yield None
+        return
+    started = time.monotonic()
+    if not screen.is_terminal:
+
+        def line(done: int, total: int, tile: Tile, outcome: Outcome) -> None:
+            left = (time.monotonic() - started) / done * (total - done)
+            found = outcome.reason or f"{len(outcome.detections)} footprints"
+            screen.print(
+                f"{done} of {total}: tile {tile.label}: {found}; {left:.0f} s left", markup=False, soft_wrap=True
+            )
+
+        yield line
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=screen, transient=True) as bar:
+        task = bar.add_task("tiles", total=None)
+
+        def move(done: int, total: int, tile: Tile, outcome: Outcome) -> None:
+            bar.update(task, completed=done, total=total, description=f"tile {tile.label}")
+
+        yield move

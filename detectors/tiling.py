@@ -1,0 +1,284 @@
+"""Tiling: a detector over an extent that does not fit in memory.
+
+Nouns
+-----
+tile
+    Square of a grid that is fixed in absolute coordinates, named by column and row. Its *core* is half open; border
+    tiles of a scene own what is centred beyond the scene, too.
+halo
+    Metres around the core that a detector sees besides it (`Detector.halo`).
+owner
+    The tile whose core holds the centre of a footprint; only the owner keeps it.
+cut
+    A footprint that reaches the rim of a tile's halo inside the scene: the tile may not see all of it.
+seam pass
+    What follows the last tile: of footprints that two tiles found (IoU above 0.5) one stays; what was cut gives way to
+    the whole of it, or is joined with the cut parts of other tiles.
+
+A tile depends on the scene and on its column and row, never on another tile, so that the result is independent of the
+order of the tiles and of the number of workers.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import statistics
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ..core.errors import RoofbenchError
+from ..scenes.geodata.footprints import Footprints
+from ..scenes.ground.lowest_points import default_cell
+from ..scenes.scene import Scene
+from .base import Detector
+
+__all__ = ["CUT", "Measured", "Seams", "Tile", "join_tiles", "measure", "owned", "stream_of", "tiles_over"]
+
+#: Attribute of the footprints of a tile that says which are cut; `join_tiles` removes it.
+CUT = "cut_by_tile"
+#: Footprints of different tiles with more than this IoU are one; cut ones give way to so much of their area.
+_SAME, _COVERED = 0.5, 0.5
+#: Metres from the rim of the halo within which a footprint counts as cut.
+_RIM = 1.0
+#: Places at which a scene is measured, and their width, metres.
+_SAMPLES, _SAMPLE_WIDTH = 5, 200.0
+
+_Extent = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, order=True)
+class Tile:
+    """A square of the fixed grid: column from west to east, row from south to north, side in metres."""
+
+    row: int
+    column: int
+    side: float
+
+    @property
+    def core(self) -> _Extent:
+        """``(xmin, ymin, xmax, ymax)``, metres."""
+        west, south = self.column * self.side, self.row * self.side
+        return west, south, west + self.side, south + self.side
+
+    @property
+    def label(self) -> str:
+        """``x 84992 y 447488``: the south-west corner."""
+        return f"x {self.core[0]:.0f} y {self.core[1]:.0f}"
+
+    def owns(self, centres: NDArray[np.float64], whole: _Extent) -> NDArray[np.bool_]:
+        """Return which centres, shape (n, 2), belong to the tile in a scene of an extent."""
+        west, south, east, north = self.core
+        west, south = -math.inf if west <= whole[0] else west, -math.inf if south <= whole[1] else south
+        east, north = math.inf if east >= whole[2] else east, math.inf if north >= whole[3] else north
+        x, y = centres[:, 0], centres[:, 1]
+        return np.asarray((x >= west) & (x < east) & (y >= south) & (y < north))
+
+    def depth(self, centres: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the distance of centres from the border of the core, metres; negative beyond it."""
+        west, south, east, north = self.core
+        x, y = centres[:, 0], centres[:, 1]
+        return np.asarray(np.minimum.reduce([x - west, east - x, y - south, north - y]))
+
+
+class Measured(NamedTuple):
+    """What all tiles of a scene share: measured parameters of the detector, and the cell of the ground filter (m)."""
+
+    parameters: dict[str, float]
+    ground_cell: float | None
+
+
+class Seams(NamedTuple):
+    """What the seam pass did, numbers of footprints.
+
+    Attributes
+    ----------
+    doubles : int
+        Left out because another tile found the same.
+    cut : int
+        Left out because another tile sees the whole of it.
+    joined : int
+        Cut parts that were joined into fewer.
+    """
+
+    doubles: int
+    cut: int
+    joined: int
+
+
+def tiles_over(extent: _Extent, side: float) -> list[Tile]:
+    """Return the tiles that an extent meets, by row and column.
+
+    >>> [tile.core[:2] for tile in tiles_over((100, 0, 600, 400), 512)]
+    [(0, 0), (512, 0)]
+    """
+    columns = range(math.floor(extent[0] / side), math.ceil(extent[2] / side))
+    rows = range(math.floor(extent[1] / side), math.ceil(extent[3] / side))
+    return [Tile(row, column, side) for row in rows for column in columns]
+
+
+def stream_of(seed: int, tile: Tile, detector: Detector) -> np.random.Generator:
+    """Return the random stream of a tile: from seed, column and row, or from the seed alone (`place_streams`)."""
+    entropy = [seed] if detector.place_streams else [seed, tile.column % 2**32, tile.row % 2**32]
+    return np.random.default_rng(np.random.SeedSequence(entropy))
+
+
+def measure(scene: Scene, detector: Detector, tiles: Sequence[Tile]) -> Measured:
+    """Return what a detector would measure (`Detector.measured`): the lower median over up to five tiles.
+
+    Only the middle of each tile is read. Tiles without points are passed over; tiles that cannot be read, too, since
+    they are reported when their turn comes.
+    """
+    found: dict[str, list[float]] = defaultdict(list)
+    cells: list[float] = []
+    for tile in _spread(tiles):
+        part = _middle(scene, tile)
+        if part is None or part.points is None or len(part.points) == 0:
+            continue
+        cells.append(default_cell(part.points.x, part.points.y, part.extent))
+        part.ground_cell = cells[-1]
+        for name, value in detector.measured(part).items():
+            found[name].append(float(value))
+        if len(cells) == _SAMPLES:
+            break
+    parameters = {name: statistics.median_low(values) for name, values in sorted(found.items())}
+    return Measured(parameters, statistics.median_low(cells) if cells else None)
+
+
+def _spread(tiles: Sequence[Tile]) -> list[Tile]:
+    """Return the tiles in an order in which the first few lie far apart (golden section)."""
+    golden = (math.sqrt(5) - 1) / 2
+    return [tiles[i] for i in np.argsort([(0.5 + golden * k) % 1 for k in range(len(tiles))], kind="stable").tolist()]
+
+
+def _middle(scene: Scene, tile: Tile) -> Scene | None:
+    west, south, east, north = tile.core
+    low_x, low_y = max(west, scene.extent[0]), max(south, scene.extent[1])
+    high_x, high_y = min(east, scene.extent[2]), min(north, scene.extent[3])
+    x, y, reach = (low_x + high_x) / 2, (low_y + high_y) / 2, min(_SAMPLE_WIDTH, tile.side) / 2
+    try:
+        part = scene.window((x - reach, y - reach, x + reach, y + reach)).for_detection()
+        _ = part.points, part.image, part.dem
+    except RoofbenchError:
+        return None
+    return part
+
+
+def owned(found: Footprints, tile: Tile, part: _Extent, whole: _Extent) -> Footprints:
+    """Return the footprints that a tile owns, with the attribute `CUT`.
+
+    Parameters
+    ----------
+    found : Footprints
+        All that was detected in the window of the tile.
+    tile : Tile
+    part, whole : tuple of float
+        Extents of the window, halo included, and of the scene.
+    """
+    found = found.take(tile.owns(found.centres, whole)) if len(found) else found
+    bounds = shapely.bounds(found.polygons).reshape(-1, 4)
+    cut = np.zeros(len(found), dtype=np.bool_)
+    for side, sign in enumerate((1, 1, -1, -1)):
+        if part[side] != whole[side]:
+            cut |= sign * (bounds[:, side] - part[side]) <= _RIM
+    return dataclasses.replace(found, attributes={**found.attributes, CUT: cut})
+
+
+def join_tiles(
+    parts: Mapping[Tile, Footprints], *, crs: str | None, numbers: Sequence[str] = (), source: str = "footprints"
+) -> tuple[Footprints, Seams]:
+    """Return the footprints of all tiles after the seam pass, by row and column of their tile, and what it did.
+
+    Parameters
+    ----------
+    parts : mapping of Tile to Footprints
+        As `owned` returns them.
+    crs : str, optional
+    numbers : sequence of str
+        Attributes that number buildings within a tile; they and building ids become unique.
+    source : str
+    """
+    tiles = [tile for tile in sorted(parts) if len(parts[tile])]
+    if not tiles:
+        return Footprints.empty(crs=crs, source=source), Seams(0, 0, 0)
+    whole = _concatenated([parts[tile] for tile in tiles], numbers, crs, source)
+    tile_of = np.repeat(np.arange(len(tiles)), [len(parts[tile]) for tile in tiles])
+    depth = np.concatenate([tile.depth(parts[tile].centres) for tile in tiles])
+    columns = dict(whole.attributes)
+    cut = columns.pop(CUT).astype(np.bool_)
+    kept, joined = _seam_pass(whole.polygons, tile_of, depth, cut)
+    polygons = whole.polygons.copy()
+    for first, group in joined.items():
+        polygons[first] = shapely.union_all(polygons[group])
+        kept[[row for row in group if row != first]] = False
+    lost = np.concatenate([np.asarray(group) for group in joined.values()]) if joined else np.empty(0, dtype=np.intp)
+    in_groups = np.zeros(len(whole), dtype=np.bool_)
+    in_groups[lost] = True
+    seams = Seams(
+        doubles=int((~kept & ~cut).sum()), cut=int((~kept & cut & ~in_groups).sum()), joined=int(in_groups.sum())
+    )
+    result = dataclasses.replace(whole, polygons=polygons, attributes=columns).take(kept)
+    return dataclasses.replace(result, ids=np.arange(len(result), dtype=np.int64)), seams
+
+
+def _seam_pass(
+    polygons: NDArray[np.object_], tile_of: NDArray[np.intp], depth: NDArray[np.float64], cut: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], dict[int, list[int]]]:
+    """Return which footprints stay, and groups of cut ones that are one, by their largest."""
+    first, second = shapely.STRtree(polygons).query(polygons, predicate="intersects")
+    across = tile_of[first] != tile_of[second]
+    first, second = first[across], second[across]
+    common = shapely.area(shapely.intersection(polygons[first], polygons[second]))
+    area = shapely.area(polygons)
+    kept = np.ones(len(polygons), dtype=np.bool_)
+    same = (common > _SAME * (area[first] + area[second] - common)) & ~(cut[first] & cut[second])
+    rivals: dict[int, list[int]] = defaultdict(list)
+    for one, other in zip(first[same].tolist(), second[same].tolist(), strict=True):
+        rivals[one].append(other)
+    # Whole ones first, then those that lie deepest in their tile: they are seen with the most around them.
+    settled = np.zeros(len(polygons), dtype=np.bool_)
+    for row in sorted(rivals, key=lambda row: (cut[row], -depth[row], row)):
+        kept[row] = not any(settled[other] for other in rivals[row])
+        settled[row] = kept[row]
+    covered = kept[second] & ~cut[second] & cut[first] & (common > _COVERED * area[first])
+    kept[first[covered]] = False
+    groups: dict[int, list[int]] = {}
+    overlap = kept[first] & kept[second] & cut[first] & cut[second] & (common > 0)
+    if overlap.any():
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        links = coo_array((np.ones(overlap.sum()), (first[overlap], second[overlap])), shape=(len(polygons),) * 2)
+        label = connected_components(links, directed=False)[1]
+        for number in np.unique(label[first[overlap]]).tolist():
+            rows = np.flatnonzero(label == number)
+            groups[int(rows[np.argmax(area[rows])])] = rows.tolist()
+    return kept, groups
+
+
+def _concatenated(parts: Sequence[Footprints], numbers: Sequence[str], crs: str | None, source: str) -> Footprints:
+    columns: dict[str, NDArray[Any]] = {}
+    for name in parts[0].attributes:
+        columns[name] = np.concatenate([part.attributes[name] for part in parts])
+    for name in set(numbers) & set(columns):
+        columns[name] = _renumbered([part.attributes[name] for part in parts])
+    labels = None
+    if any(part.building_ids is not None for part in parts):
+        labels = _renumbered([part.building_codes for part in parts])
+    polygons = np.concatenate([part.polygons for part in parts])
+    return Footprints(polygons=polygons, building_ids=labels, crs=crs, attributes=columns, source=source)
+
+
+def _renumbered(columns: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
+    """Return numbers of several results as one column, no number twice."""
+    start, found = 0, []
+    for column in columns:
+        found.append(column.astype(np.int64) + start)
+        start += int(column.max()) + 1 if len(column) else 0
+    return np.concatenate(found)

@@ -1,0 +1,138 @@
+"""A city: tiles give what the whole gives, in any order, with any number of workers, and after any interruption."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import shapely
+from builders.town import HOUSES, same_footprints, town_folder
+
+import roofbench as rb
+from roofbench.benchmark.execution.city import City, detect_city
+from roofbench.benchmark.execution.runner import Execution
+from roofbench.benchmark.identity.recipes import SceneRecipe
+from roofbench.core.errors import OutputError, ParameterError
+from roofbench.detectors.registry import make_detector
+
+HERE = Execution(jobs=0)
+NDSM = make_detector("ndsm[cell=0.5]")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return town_folder(tmp_path_factory.mktemp("scene") / "town")
+
+
+def detect(folder, output, *, detector=NDSM, tile=64.0, execution=HERE, **options):
+    return detect_city(SceneRecipe.of_folder(folder), detector, output, City(tile=tile), execution=execution, **options)
+
+
+def work_folder(output):
+    return output.with_name(output.name + ".tiles")
+
+
+def test_tiles_give_what_the_whole_gives(folder, tmp_path):
+    result = detect(folder, tmp_path / "city.gpkg")
+    city, whole = rb.read_footprints(tmp_path / "city.gpkg"), rb.detect(rb.open_scene(folder), NDSM)
+    assert result.tiles == 16
+    assert len(city) == len(whole) == len(HOUSES)
+    assert same_footprints(whole, city).all()
+    assert not work_folder(tmp_path / "city.gpkg").exists()
+
+
+def test_a_hall_that_no_tile_sees_whole_is_joined(folder, tmp_path):
+    city = City(tile=32.0, halo=24.0)
+    recipe = SceneRecipe.of_folder(folder)
+    result = detect_city(recipe, NDSM, tmp_path / "city.gpkg", city, execution=HERE)
+    found = rb.read_footprints(tmp_path / "city.gpkg")
+    hall = shapely.box(*HOUSES["hall"])
+    (match,) = [polygon for polygon in found.polygons if polygon.intersects(hall)]
+    assert result.seams.joined > 1
+    assert match.intersection(hall).area / match.union(hall).area > 0.9
+    assert len(found) == len(HOUSES)
+
+
+def test_neither_workers_nor_order_change_a_bit(folder, tmp_path):
+    contents = []
+    for name, options in {
+        "one": {},
+        "two": {"execution": Execution(jobs=2)},
+        "shuffled": {"order": lambda tiles: random.Random(1).sample(tiles, len(tiles))},
+    }.items():
+        (tmp_path / name).mkdir()
+        detect(folder, tmp_path / name / "city.fgb", **options)
+        contents.append((tmp_path / name / "city.fgb").read_bytes())
+    assert contents[0] == contents[1] == contents[2]
+
+
+def test_values_that_a_detector_measures_are_shared_by_all_tiles(folder, tmp_path):
+    result = detect(folder, tmp_path / "city.fgb", detector=make_detector("ndsm"))
+    assert result.measured.parameters == {"cell": pytest.approx(0.7)}
+    assert result.measured.ground_cell is not None
+
+
+def command(folder, output):
+    words = ["detect", "ndsm[cell=0.5]", str(folder), "--tile", "32", "-j", "2", "-o", str(output)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    return subprocess.Popen([sys.executable, "-m", "roofbench", *words], env=environment, stderr=subprocess.PIPE)
+
+
+def finished_tiles(output):
+    return len(list(work_folder(output).glob("*_*"))) if work_folder(output).exists() else 0
+
+
+def test_a_killed_run_resumes_without_loss(folder, tmp_path):
+    (tmp_path / "whole").mkdir()
+    whole, output = tmp_path / "whole" / "city.fgb", tmp_path / "city.fgb"
+    detect(folder, whole, tile=32.0)
+    process = command(folder, output)
+    while finished_tiles(output) < 4 and process.poll() is None:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert not output.exists()
+    before = finished_tiles(output)
+    assert before >= 4
+    resumed = command(folder, output)
+    message = resumed.communicate()[1].decode()
+    assert resumed.returncode == 0, message
+    assert f"{before} of them finished before" in message
+    assert output.read_bytes() == whole.read_bytes()
+    assert not work_folder(output).exists()
+
+
+def test_outcomes_of_other_parameters_are_not_used(folder, tmp_path, misbehaving):
+    output = tmp_path / "city.fgb"
+    bad = make_detector(misbehaving, {"mode": "raises"})
+    assert len(detect(folder, output, detector=bad).failed) == 16
+    result = detect(folder, output, overwrite=True)
+    assert (result.reused, result.footprints) == (0, len(HOUSES))
+
+
+def test_another_seed_reuses_the_tiles_of_a_detector_that_draws_no_random_numbers(folder, tmp_path):
+    recipe, output = SceneRecipe.of_folder(folder), tmp_path / "city.fgb"
+    seen = []
+    for seed in (0, 1):
+        with pytest.raises(KeyboardInterrupt):
+            detect_city(
+                recipe, NDSM, output, City(tile=64.0, seed=seed), execution=HERE, progress=lambda *_: interrupt()
+            )
+        seen.append(finished_tiles(output))
+    assert seen == [1, 2]
+
+
+def interrupt():
+    raise KeyboardInterrupt
+
+
+def test_bad_sizes_and_places_are_refused(folder, tmp_path):
+    with pytest.raises(ParameterError, match="tile=5 "):
+        City(tile=5)
+    with pytest.raises(OutputError, match="no folder"):
+        detect(folder, tmp_path / "missing" / "city.fgb")
+    with pytest.raises(OutputError, match="file ending"):
+        detect(folder, tmp_path / "city.xyz")

@@ -1,0 +1,122 @@
+"""Tiling: every place has one owner, and the seam pass leaves one footprint for each building."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roofbench.detectors.mpp.mpp_detector import MPP
+from roofbench.detectors.ndsm.ndsm_detector import NDSM
+from roofbench.detectors.registry import DETECTORS
+from roofbench.detectors.tiling import CUT, Tile, join_tiles, owned, stream_of, tiles_over
+from roofbench.scenes.geodata.footprints import Footprints
+
+WHOLE = (0.0, 0.0, 300.0, 100.0)
+LEFT, MIDDLE, RIGHT = tiles_over(WHOLE, 100.0)
+
+
+def part(*boxes, cut=False, **columns):
+    polygons = [shapely.box(*box) for box in boxes]
+    attributes = {CUT: np.full(len(boxes), cut), **{name: np.array(values) for name, values in columns.items()}}
+    return Footprints.of(polygons, attributes=attributes)
+
+
+def joined(parts, **options):
+    found, seams = join_tiles(parts, crs=None, **options)
+    return [tuple(bounds) for bounds in shapely.bounds(found.polygons).tolist()], seams
+
+
+coordinate = st.floats(-1e4, 1e4)
+
+
+@given(st.tuples(coordinate, coordinate), st.tuples(coordinate, coordinate), st.floats(16, 700))
+def test_every_centre_has_one_owner_also_beyond_the_scene(corner, centre, side):
+    whole = (*corner, corner[0] + 900, corner[1] + 700)
+    owners = [tile for tile in tiles_over(whole, side) if tile.owns(np.array([centre]), whole)[0]]
+    assert len(owners) == 1
+
+
+def test_the_grid_of_tiles_does_not_depend_on_the_scene():
+    assert set(tiles_over((100, 100, 200, 200), 64)) <= set(tiles_over((-900, -900, 900, 900), 64))
+
+
+def test_a_core_is_half_open():
+    centres = np.array([[100.0, 50.0]])
+    assert not LEFT.owns(centres, WHOLE)[0]
+    assert MIDDLE.owns(centres, WHOLE)[0]
+
+
+def test_the_random_stream_of_a_tile_follows_from_seed_and_place():
+    def draws(seed, tile):
+        return stream_of(seed, tile, NDSM()).integers(2**62, size=2).tolist()
+
+    seen = [draws(seed, tile) for seed in (0, 1) for tile in (LEFT, MIDDLE, Tile(-3, -2, 100.0))]
+    assert len({tuple(values) for values in seen}) == 6
+    assert draws(0, LEFT) == draws(0, LEFT)
+    # The sampler derives its streams from absolute places itself.
+    assert stream_of(0, LEFT, MPP()).integers(2**62) == stream_of(0, MIDDLE, MPP()).integers(2**62)
+
+
+def test_a_footprint_at_the_rim_of_the_halo_is_cut_but_not_at_the_rim_of_the_scene():
+    found = part((0, 10, 20, 20), (40, 40, 50, 50), (70, 10, 120, 20))
+    assert owned(found, LEFT, (0.0, 0.0, 120.0, 100.0), WHOLE).attributes[CUT].tolist() == [False, False, True]
+
+
+def test_what_two_tiles_found_stays_once_where_it_lies_deeper():
+    parts = {LEFT: part((90, 10, 109, 20)), MIDDLE: part((91, 10, 112, 20), (150, 10, 160, 20))}
+    boxes, seams = joined(parts)
+    assert boxes == [(91, 10, 112, 20), (150, 10, 160, 20)]
+    assert tuple(seams) == (1, 0, 0)
+
+
+def test_overlaps_within_a_tile_stay():
+    boxes, seams = joined({LEFT: part((10, 10, 30, 20), (11, 10, 31, 20))})
+    assert len(boxes) == 2
+    assert not any(seams)
+
+
+def test_a_cut_footprint_gives_way_to_the_whole_of_it():
+    parts = {LEFT: part((60, 10, 120, 20), cut=True), MIDDLE: part((60, 10, 200, 20))}
+    boxes, seams = joined(parts)
+    assert boxes == [(60, 10, 200, 20)]
+    assert tuple(seams) == (0, 1, 0)
+
+
+def test_cut_parts_of_which_no_tile_sees_the_whole_are_joined():
+    parts = {
+        LEFT: part((10, 10, 120, 20), cut=True),
+        MIDDLE: part((80, 10, 220, 20), cut=True),
+        RIGHT: part((180, 10, 290, 20), cut=True),
+    }
+    boxes, seams = joined(parts)
+    assert boxes == [(10, 10, 290, 20)]
+    assert tuple(seams) == (0, 0, 3)
+
+
+def test_the_order_of_the_parts_does_not_matter():
+    rng = np.random.default_rng(0)
+    boxes = [(x, y, x + 12, y + 12) for x, y in rng.uniform(0, 280, (60, 2)).tolist()]
+    parts = {tile: part(*boxes[n::3]) for n, tile in enumerate((LEFT, MIDDLE, RIGHT))}
+    turned = dict(reversed(parts.items()))
+    assert joined(parts) == joined(turned)
+
+
+def test_numbers_and_building_ids_stay_unique_over_tiles():
+    one = part((10, 10, 20, 20), (20, 10, 30, 20), part_of=[0, 0])
+    two = part((150, 10, 160, 20), part_of=[0])
+    found, _ = join_tiles({LEFT: one, MIDDLE: two}, crs=None, numbers=("part_of",))
+    assert found.attributes["part_of"].tolist() == [0, 0, 1]
+    assert CUT not in found.attributes
+
+
+def test_no_tile_with_footprints_is_a_result():
+    found, seams = join_tiles({LEFT: Footprints.empty()}, crs="EPSG:25832")
+    assert len(found) == 0
+    assert found.crs == "EPSG:25832"
+    assert not any(seams)
+
+
+@pytest.mark.parametrize("name", ["improved", "mpp", "mpp-printed", "ndsm", "original"])
+def test_every_detector_declares_a_halo(name):
+    assert 0 < DETECTORS.get(name).build().halo < 1000
