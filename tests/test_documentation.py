@@ -123,12 +123,16 @@ PLAIN = {
     r"what still runs has nobody": "running tasks are abandoned",
     r"Bridges are buildings": "bridges are detected as buildings",
     r"says of every object why": "explains why",
-    r"\btold\b": "reported, printed",
-    r"\bjudge[sd]?\b": "evaluator, evaluates",
-    r"\bmended\b": "repaired",
-    r"\bborne\b": "tolerated",
-    r"\bentrants?\b": "detector entry",
-    r"\bincidents?\b": "failure or skip",
+    # Also in names: an underscore is no letter.
+    r"(?<![a-z])told(?![a-z])": "reported, printed",
+    r"(?<![a-z])mine(?![a-z])": "own",
+    r"(?<![a-z])judge[sd]?(?![a-z])": "evaluator, evaluates",
+    r"(?<![a-z])mend(ed|ing)?(?![a-z])": "repaired",
+    r"(?<![a-z])borne(?![a-z])": "tolerated",
+    r"(?<![a-z])entrants?(?![a-z])": "detector entry",
+    r"(?<![a-z])incidents?(?![a-z])": "failure or skip",
+    r"(?<![a-z])knobs?(?![a-z])": "parameter",
+    r"is the dearer|times dearer": "more expensive",
 }
 TEXTS = [
     path

@@ -15,7 +15,7 @@ def suite_file(tmp_path, misbehaving):
 
 
 GOOD = """\
-name = "mine"
+name = "own"
 
 [[scenes]]
 preset = "hamlet"
@@ -34,7 +34,7 @@ matching = "overlap"
 
 def test_a_suite_lists_scenes_detectors_and_evaluators(suite_file):
     suite = read_suite(suite_file(GOOD))
-    assert suite.name == "mine"
+    assert suite.name == "own"
     assert [scene.name for scene in suite.scenes] == ["hamlet-4", "hamlet-7"]
     assert [(entry.label, entry.seeds) for entry in suite.detectors] == [("misbehaving[side=7]", (0, 1, 2))]
     assert [evaluator.matching for evaluator in suite.evaluators] == ["overlap"]
@@ -44,14 +44,14 @@ def test_scenes_and_seeds_are_selected(suite_file):
     suite = read_suite(suite_file(GOOD))
     assert [scene.name for scene in suite.with_scenes("*-7").scenes] == ["hamlet-7"]
     assert [scene.name for scene in suite.with_seeds(3).scenes] == ["hamlet-1", "hamlet-2", "hamlet-3"]
-    with pytest.raises(RoofbenchError, match="no scene of 'mine' matches"):
+    with pytest.raises(RoofbenchError, match="no scene of 'own' matches"):
         suite.with_scenes("knox*")
 
 
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ('name = "mine"', 'nmae = "mine"', r"line 1: unknown key 'nmae' \(did you mean 'name'\?\)"),
+        ('name = "own"', 'nmae = "own"', r"line 1: unknown key 'nmae' \(did you mean 'name'\?\)"),
         ('"hamlet"', '"hamlt"', r"line 4: no preset 'hamlt' \(did you mean 'hamlet'\?\).* in \[\[scenes\]\] number 1"),
         ("side = 7", "side = -7", r"line 9: misbehaving: side must be at least 0.1 m, not -7 in \[\[detectors\]\]"),
         ("side = 7", "sied = 7", r"line 9: misbehaving: no parameter 'sied' \(did you mean 'side'\?\)"),

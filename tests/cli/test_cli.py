@@ -68,7 +68,7 @@ def test_resume_needs_no_suite(cli, misbehaving):
     assert "misbehaving[side=7]" in cli("run", "--resume", "-j", 0).stdout
 
 
-def test_ls_filters_and_tells_reasons(cli, misbehaving):
+def test_ls_filters_and_shows_reasons(cli, misbehaving):
     cli("run", "hamlet", "-d", f"{misbehaving}[mode=raises]", "-d", misbehaving, "-j", 0, code=3)
     assert "ZeroDivisionError: no houses at all" in cli("ls").stdout
     (row,) = json.loads(cli("ls", "--status", "ok", "-f", "json").stdout)
@@ -87,7 +87,7 @@ def test_why_says_what_a_run_depends_on(cli, misbehaving):
     assert "no run named '77'" in cli("why", 77, code=2)
 
 
-def test_score_judges_stored_detections_anew(cli, misbehaving):
+def test_score_evaluates_stored_detections_again(cli, misbehaving):
     cli("run", "hamlet", "-d", misbehaving, "-j", 0)
     assert "matching overlap" in cli("score", "-e", "threshold-free[matching=overlap]").stdout
 
@@ -240,7 +240,7 @@ def bad_plugins(tmp_path_factory):
         ("Stumbles", "ZeroDivisionError: no houses at all"),
     ],
 )
-def test_check_plugin_outlives_a_detector_that_takes_its_process_along(cli, bad_plugins, name, problem):
+def test_check_plugin_survives_a_detector_that_ends_its_process(cli, bad_plugins, name, problem):
     result = cli("check-plugin", f"{bad_plugins}:{name}", code=3)
     assert problem in result.stdout
     assert "rules followed" in result.stdout.splitlines()[-1]
@@ -248,7 +248,7 @@ def test_check_plugin_outlives_a_detector_that_takes_its_process_along(cli, bad_
 
 
 @pytest.mark.parametrize(("name", "problem"), [("Leaves", "SystemExit: 0"), ("Stumbles", "no houses at all")])
-def test_detect_tells_an_error_of_the_detector_after_its_traceback(cli, bad_plugins, tmp_path, name, problem):
+def test_detect_prints_an_error_of_the_detector_after_its_traceback(cli, bad_plugins, tmp_path, name, problem):
     result = cli("detect", f"{bad_plugins}:{name}", "hamlet", "-o", "out.gpkg", code=3)
     assert result.stdout == ""
     *before, last = result.stderr.strip().splitlines()
@@ -280,7 +280,7 @@ def test_the_folder_for_results_is_checked_before_the_runs(cli, misbehaving, tmp
     assert "0 of 0 runs" in cli("ls").stdout
 
 
-def test_files_are_written_before_a_table_that_nobody_reads(cli, misbehaving, tmp_path, monkeypatch):
+def test_files_are_written_before_a_table_whose_reader_has_gone(cli, misbehaving, tmp_path, monkeypatch):
     from roofbench.cli import sweep
     from roofbench.reports import leaderboard_text
 

@@ -101,7 +101,7 @@ def test_a_comparison_of_nothing_with_nothing_can_be_drawn(files):
     assert (files / "none.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_no_repair_goes_unmentioned(files):
+def test_every_repair_is_reported(files):
     flat = shapely.Polygon([(0, 0), (5, 0), (9, 0)])
     from roofbench.scenes.geodata.vector_files import write_layers
 
@@ -111,7 +111,7 @@ def test_no_repair_goes_unmentioned(files):
     assert "flat.gpkg: 4 more repaired or left out" in run.stderr
 
 
-def test_verdicts_in_a_format_of_one_layer_tell_the_side(files):
+def test_verdicts_in_a_format_of_one_layer_have_a_column_for_the_side(files):
     roofbench("evaluate", "d.geojson", "r.gpkg", "--verdicts", "v.geojson", "-q", folder=files)
     sides = pyogrio.read_dataframe(files / "v.geojson")["side"].value_counts().to_dict()
     assert sides == {"detection": 3, "reference": 4}
@@ -254,7 +254,7 @@ def test_bad_input_gets_one_sentence_and_exit_code_two(files, case):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_read_only_folder_is_told(files):
+def test_a_read_only_folder_is_reported(files):
     (files / "locked").mkdir(mode=0o555)
     run = roofbench("evaluate", "d.geojson", "r.gpkg", "--verdicts", "locked/v.gpkg", folder=files, expect=2)
     assert "no permission" in run.stderr

@@ -48,12 +48,12 @@ def test_its_files_are_complete(written):
 
 
 def test_a_new_detector_gets_on_the_leaderboard(tmp_path):
-    roofbench("new", "detector", "mine", folder=tmp_path)
-    board = roofbench("run", "hamlet", "-d", "mine/mine.py:Mine", "-j", 0, folder=tmp_path).stdout
-    assert "mine" in board
+    roofbench("new", "detector", "own", folder=tmp_path)
+    board = roofbench("run", "hamlet", "-d", "own/own.py:Own", "-j", 0, folder=tmp_path).stdout
+    assert "own" in board
 
 
-@pytest.mark.parametrize("name", ["Mine", "1st", "my detector", "../mine", "mine.py", ""])
+@pytest.mark.parametrize("name", ["Own", "1st", "my detector", "../own", "own.py", ""])
 def test_a_name_that_is_no_name_is_refused(name, tmp_path):
     with pytest.raises(ParameterError, match="cannot be used as a name"):
         write_template("detector", name, tmp_path / "folder")
@@ -68,4 +68,4 @@ def test_a_name_that_is_taken_is_refused(tmp_path):
 
 def test_nothing_is_overwritten(tmp_path):
     with pytest.raises(OutputError, match="exists already"):
-        write_template("suite", "mine", tmp_path)
+        write_template("suite", "own", tmp_path)

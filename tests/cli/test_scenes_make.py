@@ -54,6 +54,6 @@ def test_the_suite_of_the_papers_holds_every_full_preset_with_three_seeds():
     assert len(scenes) == 3 * len(full)
 
 
-def test_the_sensitivity_suite_turns_one_knob_at_a_time():
+def test_the_sensitivity_suite_varies_one_parameter_at_a_time():
     for scene in named_suite("sensitivity").scenes:
         assert len(scene.parameters) == 1

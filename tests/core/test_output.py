@@ -15,16 +15,16 @@ def test_a_folder_of_its_own_kind_is_replaced(tmp_path):
 
 @pytest.mark.parametrize("name", ["thesis.docx", "photographs/"])
 def test_a_folder_that_holds_anything_else_is_never_replaced(tmp_path, name):
-    mine = tmp_path / "mine"
-    mine.mkdir()
-    (mine / "one.txt").write_text("one")
-    (mine / name).mkdir() if name.endswith("/") else (mine / name).write_text("years of work")
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "one.txt").write_text("one")
+    (own / name).mkdir() if name.endswith("/") else (own / name).write_text("years of work")
     with (
-        pytest.raises(OutputError, match=f"mine holds {name.rstrip('/')}, which replacing it would delete"),
-        whole_folder(mine, holds=("*.txt",), overwrite=True),
+        pytest.raises(OutputError, match=f"own holds {name.rstrip('/')}, which replacing it would delete"),
+        whole_folder(own, holds=("*.txt",), overwrite=True),
     ):
         pytest.fail("not reached")
-    assert len(list(mine.iterdir())) == 2
+    assert len(list(own.iterdir())) == 2
 
 
 def test_a_device_is_no_file(tmp_path):
@@ -38,7 +38,7 @@ def test_a_device_is_no_file(tmp_path):
         pytest.fail("not reached")
 
 
-def test_a_full_disk_is_told_in_words_and_leaves_nothing(tmp_path):
+def test_a_full_disk_is_one_sentence_and_leaves_nothing(tmp_path):
     def write():
         with whole_file(tmp_path / "big.bin") as scratch:
             scratch.write_text("half of it")
@@ -49,7 +49,7 @@ def test_a_full_disk_is_told_in_words_and_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_points_that_find_no_room_are_told_in_words(tmp_path, monkeypatch):
+def test_points_that_do_not_fit_on_the_disk_are_one_sentence(tmp_path, monkeypatch):
     import laspy
     from builders import small_scenes
     from lazrs import LazrsError

@@ -72,7 +72,7 @@ SAMPLES: dict[str, Sample] = {
 }
 
 _SUITE = """
-name = "mine"
+name = "own"
 [[scenes]]
 preset = "hamlet"
 seeds = [1, 2]
@@ -105,7 +105,7 @@ def _baselines(folder: Path) -> None:
     for name, quality in (("old", 0.8), ("new", 0.81)):
         values = {index.key: quality for index in evaluator.indices}
         Baseline(
-            suite="mine",
+            suite="own",
             version=CodeVersion("1", name, False),
             created="2026-01-01T00:00:00+00:00",
             evaluator=PluginRecipe("threshold-free", evaluator.values()),

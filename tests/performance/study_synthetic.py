@@ -1,7 +1,7 @@
 """Pictures and difficulty curves of docs/results/synthetic.md.
 
 ``python tests/performance/study_synthetic.py pictures FOLDER [PRESET ...]`` draws presets; ``... curves FILE.png``
-prints and plots how the plain detector fares as one knob is turned, over ten seeds; ``... presets`` how on each preset.
+prints and plots the quality of the plain detector along one parameter, over ten seeds; ``... presets`` on each preset.
 """
 
 import io

@@ -111,7 +111,7 @@ def test_pooled_and_mean_are_switched(show):
     assert [row.get_attribute("data-pooling") for row in rows] == ["mean", "mean"]
 
 
-def test_a_click_on_a_false_alarm_tells_why(show):
+def test_a_click_on_a_false_alarm_shows_why(show):
     driver = show(page_of())
     click_on(driver, "FP")
     detail = driver.find_element("id", "detail").text

@@ -51,7 +51,7 @@ def test_facts_are_those_of_the_scene(saved):
     assert report.facts["area"]["share"] == pytest.approx(38**2 / 1600)
 
 
-def test_facts_are_told_as_json(check):
+def test_facts_are_printed_as_json(check):
     code, out, _ = check("--format", "json")
     assert code == 0
     message = json.loads(out)
@@ -59,7 +59,7 @@ def test_facts_are_told_as_json(check):
     assert message["facts"]["points"]["count"] == 4000
 
 
-def test_an_edited_file_is_told_until_its_checksum_is_updated(saved, check):
+def test_an_edited_file_is_reported_until_its_checksum_is_updated(saved, check):
     write_points(small_scenes.cloud(50), saved / "points.laz", crs=small_scenes.CRS)
     code, _, err = check()
     assert code == 2
@@ -109,7 +109,7 @@ def _broken_points(saved):
         (_broken_points, "points.laz is truncated or broken"),
     ],
 )
-def test_what_does_not_fit_is_told(saved, check, spoil, problem):
+def test_what_does_not_fit_is_reported(saved, check, spoil, problem):
     spoil(saved)
     code, _, err = check("--update-checksums")
     assert code == 2

@@ -163,12 +163,12 @@ def test_a_folder_that_is_no_scene_is_answered_in_words(tmp_path):
 
 
 def test_a_scene_never_replaces_a_folder_with_other_files(saved, tmp_path):
-    shutil.copytree(saved, tmp_path / "mine")
-    (tmp_path / "mine" / "reference.qmd").write_text("left by a GIS")
-    rb.save_scene(small_scenes.scene(), tmp_path / "mine", overwrite=True)
-    (tmp_path / "mine" / "project.qgz").write_text("hours of work")
-    with pytest.raises(OutputError, match=r"mine holds project\.qgz, which replacing it would delete"):
-        rb.save_scene(small_scenes.scene(), tmp_path / "mine", overwrite=True)
+    shutil.copytree(saved, tmp_path / "own")
+    (tmp_path / "own" / "reference.qmd").write_text("left by a GIS")
+    rb.save_scene(small_scenes.scene(), tmp_path / "own", overwrite=True)
+    (tmp_path / "own" / "project.qgz").write_text("hours of work")
+    with pytest.raises(OutputError, match=r"own holds project\.qgz, which replacing it would delete"):
+        rb.save_scene(small_scenes.scene(), tmp_path / "own", overwrite=True)
 
 
 @pytest.mark.parametrize(("crs", "message"), [("EPSG:4326", "geographic"), ("EPSG:1", "no coordinate reference")])

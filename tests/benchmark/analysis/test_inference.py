@@ -29,7 +29,7 @@ def test_the_sign_flip_test_is_the_enumeration_of_all_signs(differences):
 
 @examples(30)  # half a million sums each
 @given(st.lists(st.sampled_from([0, 0, 0, 1, -1, 7, -900, 4095, -4096]), min_size=16, max_size=18))
-def test_many_differences_are_judged_as_by_enumeration(differences):
+def test_the_test_of_many_differences_agrees_with_enumeration(differences):
     differences = [4096, *differences]  # the largest is the unit of the lattice
     sums = np.zeros(1, dtype=int)
     for difference in differences:
@@ -82,7 +82,7 @@ def test_the_test_holds_its_level_and_finds_a_shift(count):
     assert shifted > 0.8
 
 
-def test_the_interval_covers_the_mean_as_often_as_it_says():
+def test_the_interval_covers_the_mean_as_often_as_its_level():
     rng = np.random.default_rng(0)
     hits = [low <= 0 <= high for low, high in (bootstrap_interval(rng.normal(0, 1, 10)) for _ in range(400))]
     assert 0.92 < np.mean(hits) < 0.985

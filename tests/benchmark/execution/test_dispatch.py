@@ -15,7 +15,7 @@ def name(run):
     return run and f"{run.identity.scene_key}.{run.identity.label}"
 
 
-def test_a_worker_keeps_its_scene_and_takes_the_detector_that_no_other_is_at():
+def test_a_worker_keeps_its_scene_and_takes_the_detector_that_runs_nowhere_else():
     dispatcher = Dispatcher(waiting("1.a", "1.b", "1.c", "2.a", "2.b", "2.c"))
     left, right = object(), object()
     order = [name(dispatcher.next_for(slot)) for slot in (left, right, left, left, right, right)]

@@ -41,7 +41,7 @@ def test_a_misbehaving_run_fails_alone_with_its_reason(process, task_of, mode, r
     assert call(process, task_of()).status == "ok"
 
 
-def test_a_run_that_eats_memory_is_stopped(process, task_of):
+def test_a_run_that_exceeds_its_memory_limit_is_stopped(process, task_of):
     outcome = call(process, task_of("eats"), memory=400_000_000)
     assert outcome.status == "failed"
     # The watcher or, when the machine is too busy for it, the bound on allocations is first.
@@ -50,7 +50,7 @@ def test_a_run_that_eats_memory_is_stopped(process, task_of):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux counts the highest memory")
-def test_a_spike_between_two_looks_is_not_missed(process, task_of):
+def test_a_memory_peak_between_two_checks_is_not_missed(process, task_of):
     outcome = call(process, task_of("spikes"), memory=400_000_000)
     assert outcome.status == "failed"
     assert "memory limit of 400 MB exceeded: " in outcome.reason
@@ -85,7 +85,7 @@ def test_numeric_libraries_get_one_thread_each(process, task_of):
     assert environment["NUMBA_NUM_THREADS"] == environment["OPENBLAS_NUM_THREADS"] == "1"
 
 
-def test_a_worker_leaves_when_its_caller_is_killed(task_of):
+def test_a_worker_exits_when_its_caller_is_killed(task_of):
     code = (
         "from roofbench.benchmark.execution.isolation import *; from roofbench.core.processes import Limits;"
         "import sys; p = IsolatedProcess(); p._running();"

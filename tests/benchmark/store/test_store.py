@@ -55,7 +55,7 @@ def outcome(task_of, keyed):
     return execute(task)
 
 
-def test_an_outcome_survives_the_way_between_processes(outcome):
+def test_an_outcome_is_unchanged_by_the_transfer_between_processes(outcome):
     assert Outcome.from_bytes(outcome.to_bytes()) == outcome
 
 

@@ -259,13 +259,13 @@ def test_a_suite_names_programs_from_its_own_folder(tmp_path, scene):
     (folder / "model").write_text("x")
     (folder / "my.toml").write_text(
         '[[scenes]]\npreset = "hamlet"\n\n[[detectors]]\nuse = "command"\nrun = "./detect.sh --fast"\nfiles = "model"\n'
-        'label = "mine"\nsettings = "height=2.5"\ninputs = "points image"\n'
+        'label = "own"\nsettings = "height=2.5"\ninputs = "points image"\n'
     )
     (entry,) = read_suite(folder / "my.toml").detectors
     assert entry.detector.run == f"{folder}/detect.sh --fast"
     assert entry.detector.files == f"{folder}/model"
     assert entry.detector.requires == ("points", "image")
-    assert entry.label == "command:mine"
+    assert entry.label == "command:own"
     assert label_of(make_detector("command", {"recipe": "whitebox"})) == "command:whitebox"
 
 
@@ -318,7 +318,7 @@ def test_a_worker_that_is_stopped_ends_its_program(program, tmp_path):
     assert not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
 
 
-def test_the_folder_of_a_program_leads_nowhere(program, square, tmp_path, scene):
+def test_the_folder_of_a_program_reveals_nothing(program, square, tmp_path, scene):
     """Neutral names, no reference, recipe, seed, provenance or times; the environment names no folder of the caller."""
     kept = tmp_path / "kept"
     body = f"cp -rp $1 {kept}; echo $1 > {tmp_path}/path; env > {tmp_path}/environment; pwd > {tmp_path}/pwd; "

@@ -100,7 +100,7 @@ def test_black_lies_across_every_line_of_outer_and_inner_outlines():
     assert not outside.any()
 
 
-def test_a_line_that_looks_away_from_the_black_is_turned():
+def test_a_line_directed_away_from_the_black_is_turned():
     black = raster_of(rectangle(150, 150, 120, 70))
     lines, _, _ = lines_around(black)
     backwards = lines.copy()

@@ -148,7 +148,7 @@ def house_on_a_pad(seed=3):
     return cloud(x, y, np.where(roof, earth + 3.2, earth) + rng.normal(0, 0.05, 3600)), slope, roof
 
 
-def test_the_ground_sinks_to_a_pad_that_the_elevation_cuts_through():
+def test_the_ground_is_lowered_to_a_pad_that_the_elevation_cuts_through():
     points, slope, roof = house_on_a_pad()
     uphill = roof & (points.x > 31)
     assert (points.z > slope + 2.5)[uphill].mean() < 0.2

@@ -37,19 +37,19 @@ def test_houses_that_touch_are_one_block_and_others_another():
     assert likeness(max(found, key=shapely.area), shapely.union_all([shapely.box(*b) for b in houses[:2]])) > 0.97
 
 
-def test_cells_say_how_far_a_block_goes_beyond_and_short_of_its_rectangles():
+def test_cells_define_the_border_of_a_block_beyond_and_inside_its_rectangles():
     found = outlined([(5, 5, 20, 15), (20, 5, 24, 9)], [(5, 5, 19, 17)])
     assert len(found) == 1
     assert likeness(found[0], shapely.union(shapely.box(5, 5, 20, 15), shapely.box(20, 5, 24, 9))) > 0.95
 
 
-def test_what_no_rectangle_confirms_is_no_block_and_a_crown_beside_a_house_none_of_it():
+def test_cells_without_a_rectangle_make_no_block_and_crowns_beside_houses_are_no_part_of_one():
     found = outlined([(5, 5, 15, 15), (40, 20, 50, 30)], [(5, 5, 15, 15)], crowns=[(15, 5, 25, 15)])
     assert len(found) == 1
     assert likeness(found[0], shapely.box(5, 5, 15, 15)) > 0.93
 
 
-def test_what_is_high_in_a_narrow_gap_joins_two_roofs_and_a_lane_parts_them():
+def test_high_cells_in_a_narrow_gap_join_two_roofs_and_a_lane_separates_them():
     houses = [(5, 5, 15, 20), (18, 5, 28, 20)]
     assert len(outlined(houses, houses, crowns=[(15, 5, 18, 20)])) == 1
     assert len(outlined(houses, houses)) == 2

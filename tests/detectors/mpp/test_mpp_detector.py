@@ -78,7 +78,7 @@ def test_the_record_holds_the_convergence_as_json():
 
 
 @pytest.mark.slow
-def test_same_seed_same_bits_with_any_number_of_threads_and_tiles_worked_off_in_any_order():
+def test_same_seed_same_bits_with_any_number_of_threads_and_tiles_in_any_order():
     points = cloud(1)
     small = "mpp[level=part,tile=40,largest_side=20,threads={}]"
     one = detect(points, small.format(1))
@@ -113,7 +113,7 @@ def test_a_large_scene_in_tiles_finds_what_one_tile_finds():
     ],
     ids=["ground", "trees", "one point", "one place", "NaN", "no points"],
 )
-def test_nothing_is_found_where_no_building_is(points):
+def test_without_buildings_nothing_is_found(points):
     found = detect(points)
     assert len(found) == 0
     assert len(make_detector("mpp").detect(Scene("no DEM", EXTENT, points=points), np.random.default_rng(0))) == 0
@@ -121,7 +121,7 @@ def test_nothing_is_found_where_no_building_is(points):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dem", [True, False], ids=["DEM", "own ground"])
-def test_on_a_lake_nothing_is_found_and_the_house_on_its_shore_is(dem):
+def test_nothing_is_found_on_a_lake_except_the_house_on_its_shore(dem):
     """Water gives few returns, some of them far below: the surface must neither break nor bring forth buildings."""
     points = cloud(8, trees=())
     rng = np.random.default_rng(3)

@@ -134,7 +134,7 @@ def test_boxes_and_superstructures_do_not_depend_on_the_number_of_threads(thread
     np.testing.assert_array_equal(found[1], alone[1])
 
 
-def test_boxes_that_share_cells_are_worked_off_in_their_order():
+def test_boxes_that_share_cells_are_processed_in_their_order():
     rng = np.random.default_rng(6)
     boxes = np.column_stack([rng.uniform(0, 150, (80, 2)), rng.uniform(3, 25, (80, 2)), rng.uniform(0, np.pi, 80)])
     grown = shapely.polygons(corners(boxes + 2 * _REACH * np.array([0, 0, 1, 1, 0])))

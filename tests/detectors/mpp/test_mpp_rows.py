@@ -179,6 +179,6 @@ def test_a_house_with_a_wing_is_one_building_and_a_part_outside_blocks_another()
     assert sorted(alone.block_of_building) == [0, 1]
 
 
-def test_nothing_has_no_levels():
+def test_empty_scenes_have_no_levels():
     found = find_levels(np.empty((0, 5)), np.empty(0, dtype=object), *place(), GRID)
     assert len(found.parts) == len(found.buildings) == 0

@@ -112,7 +112,7 @@ def test_an_energy_that_is_not_below_the_limit_is_given_up_and_one_below_is_exac
 
 
 @pytest.mark.parametrize("kind", list(Roof))
-def test_the_roof_that_stands_there_is_found_with_its_spread(kind):
+def test_the_true_roof_is_found_with_its_spread(kind):
     rng = np.random.default_rng(kind)
     rectangle = np.array([25.3, 20.2, 26.0, 14.0, 0.4])
     u, v = naive.frame(rectangle, ROWS, COLUMNS)

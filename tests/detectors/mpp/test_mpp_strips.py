@@ -36,14 +36,14 @@ def left_over(world, *rectangles, slender=3.0, part_share=0.1):
     return absorb_strips(world, MODEL, np.array(rectangles), slender=slender, part_share=part_share)
 
 
-def test_a_strip_of_the_same_roof_is_taken_in():
+def test_a_strip_of_the_same_roof_is_absorbed():
     world = tables((15, 10, 39, 40, 9.0))
     found = left_over(world, HALL, (25.0, 37.0, 30.0, 4.0, 0.0))
     np.testing.assert_allclose(found, [[25, 27, 30, 24, 0]])
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_strip_that_the_building_cannot_take_in_is_left_out(turned):
+def test_a_strip_that_the_building_cannot_absorb_is_left_out(turned):
     world = tables((15, 10, 35, 40, 9.0), (35, 10, 38, 25, 3.0))
     strip = (17.5, 36.5, 3.0, 15.0, np.pi / 2) if turned else (17.5, 36.5, 15.0, 3.0, 0.0)
     np.testing.assert_array_equal(left_over(world, HALL, strip), [HALL])
@@ -61,14 +61,14 @@ def test_houses_of_a_row_stay():
     np.testing.assert_array_equal(left_over(world, *row), row)
 
 
-def test_a_strip_of_a_strip_goes_with_it():
+def test_a_strip_of_a_strip_is_absorbed_with_it():
     world = tables((15, 10, 41, 40, 9.0))
     found = left_over(world, HALL, (25.0, 37.0, 30.0, 4.0, 0.0), (25.0, 40.0, 30.0, 2.0, 0.0))
     assert len(found) == 1
     np.testing.assert_allclose(found[0, 2:4], [30, 26])
 
 
-def test_nothing_lies_along_anything_in_an_empty_scene_and_with_rules_that_never_hold():
+def test_empty_scenes_and_rules_that_never_hold_have_no_strips():
     world = tables((15, 10, 39, 40, 9.0))
     assert absorb_strips(world, MODEL, np.empty((0, 5)), slender=3.0, part_share=0.1).shape == (0, 5)
     both = HALL, (25.0, 37.0, 30.0, 4.0, 0.0)

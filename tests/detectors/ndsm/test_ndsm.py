@@ -41,9 +41,9 @@ class Place:
         self.returns[inside] = self.rng.integers(1, 4, inside.sum())
         return self
 
-    def scene(self, *, told_returns=True, **more):
+    def scene(self, *, numbered=True, **more):
         z = self.z + self.rng.normal(0, 0.03, len(self.z))
-        returns = (self.returns, self.number) if told_returns else (None, None)
+        returns = (self.returns, self.number) if numbered else (None, None)
         return Scene("place", EXTENT, crs="EPSG:25832", points=PointCloud(self.x, self.y, z, *returns), **more)
 
 
@@ -87,8 +87,8 @@ def test_an_l_house_stays_one_polygon_with_six_corners():
 def test_a_tree_of_the_size_of_a_house_is_dropped_with_and_without_return_numbers():
     house = rectangle(12, 9, at=translate(CENTRE, -15))
     place = Place().roof(house).tree(translate(CENTRE, 15).buffer(5))
-    for told_returns in (True, False):
-        found = NDSM().detect(place.scene(told_returns=told_returns), RNG)
+    for numbered in (True, False):
+        found = NDSM().detect(place.scene(numbered=numbered), RNG)
         assert len(found) == 1
         assert iou(found.polygons[0], house) > 0.9
 
@@ -188,12 +188,12 @@ def green_image(polygon, *, nir):
 
 
 @pytest.mark.parametrize("nir", [False, True])
-def test_a_smooth_green_hedge_is_told_from_a_roof_by_the_image(nir):
+def test_a_smooth_green_hedge_is_separated_from_a_roof_by_the_image(nir):
     house, hedge = rectangle(12, 9, at=translate(CENTRE, -15)), rectangle(8, 6, at=translate(CENTRE, 15))
     place = Place().roof(house).roof(hedge, 4.0)
     only_laser = NDSM(roughness=None, penetration=None)
-    assert len(only_laser.detect(place.scene(told_returns=False), RNG)) == 2
-    found = only_laser.detect(place.scene(told_returns=False, image=green_image(hedge, nir=nir)), RNG)
+    assert len(only_laser.detect(place.scene(numbered=False), RNG)) == 2
+    found = only_laser.detect(place.scene(numbered=False, image=green_image(hedge, nir=nir)), RNG)
     assert len(found) == 1
     assert iou(found.polygons[0], house) > 0.9
 
@@ -205,7 +205,7 @@ def test_rectangles_on_request():
     assert iou(found.polygons[0], shapely.minimum_rotated_rectangle(house)) > 0.9
 
 
-def test_each_footprint_tells_its_height_and_its_likeness_to_a_tree():
+def test_each_footprint_has_its_height_and_its_likeness_to_a_tree():
     found = NDSM().detect(Place().roof(rectangle(14, 9), 7.0).scene(), RNG)
     assert found.attributes["height"][0] == pytest.approx(7.0, abs=0.2)
     assert found.attributes["tree_likeness"][0] < -0.8

@@ -54,7 +54,7 @@ def test_shares_count_what_they_say():
     assert np.isnan(cues.high_share[5, 5])
 
 
-def test_single_returns_alone_tell_nothing_of_multiple_returns():
+def test_single_returns_alone_give_no_share_of_multiple_returns():
     x, y, z = cloud()
     points = PointCloud(x, y, z, number_of_returns=np.ones(len(x), dtype=np.uint8))
     assert cell_cues(points, z.astype(np.float32), GRID, threshold=2.5, window=2.0).multiple_share is None

@@ -63,7 +63,7 @@ def test_footprints_are_cut_at_the_area():
     assert shapely.get_dimensions(cut.polygons[3]) in (-1, 2), "no line is left of what only touches"
 
 
-def test_repairs_are_told_by_source_action_and_row():
+def test_repairs_are_reported_by_source_action_and_row():
     bow_tie = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
     some = rb.Footprints.of([bow_tie, *[shapely.Polygon()] * 12, house(0)], source="a.gpkg")
     one, two = repair_notes(some)

@@ -60,7 +60,7 @@ def test_distances_that_differ_by_less_than_a_micrometre_are_ties():
 
 
 @pytest.mark.parametrize("matching", MATCHINGS)
-def test_without_overlaps_nobody_has_a_partner(matching):
+def test_without_overlaps_no_object_has_a_partner(matching):
     found = matched([], {}, (2, 3), matching)
     assert (found.of_detection.tolist(), found.of_reference.tolist()) == ([-1, -1], [-1, -1, -1])
     assert found.booked_on.tolist() == [-1, -1]

@@ -171,7 +171,7 @@ def test_the_ratio_identities_hold(seed):
 
 @laws
 @given(seeds)
-def test_a_false_alarm_more_never_raises_correctness(seed):
+def test_one_more_false_alarm_never_raises_correctness(seed):
     detected, reference, building = scene(seed)
     before = evaluate(detected, reference, building)
     after = evaluate([*detected, shapely.box(500, 500, 510, 510)], reference, building)

@@ -20,7 +20,7 @@ def house(x, y=0.0, width=10.0, depth=10.0):
     return shapely.box(x, y, x + width, y + depth)
 
 
-def test_a_found_building_tells_its_shift_iou_and_corner_distance():
+def test_a_found_building_has_its_shift_iou_and_corner_distance():
     found = verdicts([house(2)], [house(0)])
     (detection,) = found.detections.itertuples()
     assert (detection.verdict, detection.partner) == ("TP", 0)
@@ -66,7 +66,7 @@ def test_a_house_found_twice_is_not_split_but_has_a_duplicate():
     assert found.references.loc[0, "reason"] == "found by detection 1, shifted 0.0 m; detected 2 times"
 
 
-def test_a_shifted_row_is_not_told_to_be_split():
+def test_a_shifted_row_is_not_called_split():
     found = verdicts([house(1), house(11), house(21)], [house(0), house(10), house(20)])
     assert not found.detections["reason"].str.contains("split").any()
     assert found.references["reason"].tolist() == [
@@ -88,7 +88,7 @@ def test_objects_are_named_by_their_row_in_the_source():
     assert found.detections.loc[0, "reason"] == "found reference 1, shifted 1.0 m"
 
 
-def test_what_is_left_out_says_so():
+def test_left_out_objects_are_marked():
     area = shapely.box(-5, -5, 30, 30)
     found = verdicts([house(0), house(100)], [house(0), house(101), house(12, width=2, depth=2)], area=area)
     assert found.detections["verdict"].tolist() == ["TP", "left out"]

@@ -43,13 +43,13 @@ def test_sound_polygons_pass_unchanged():
         (MultiPolygon([box(0, 0, 2, 2), box(1, 1, 3, 3)]), "Self-intersection[1 2]: repaired"),
     ],
 )
-def test_what_is_not_usable_is_told(geometry, printed):
+def test_what_is_not_usable_is_reported(geometry, printed):
     # Where along the ring the fault is found differs between versions of GEOS.
     (found,) = repairs(box(0, 0, 1, 1), geometry)
     assert re.sub(r"\[.*\]", "", found) == "feature 1: " + re.sub(r"\[.*\]", "", printed)
 
 
-def test_mending_keeps_the_area_that_is_meant():
+def test_repairs_keep_the_area_that_is_meant():
     footprints = rb.Footprints.of([BOW_TIE, MultiPolygon([box(0, 0, 2, 2), box(1, 1, 3, 3)])])
     assert footprints.areas.tolist() == [2.0, 7.0]
     assert shapely.is_valid(footprints.polygons).all()

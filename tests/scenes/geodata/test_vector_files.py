@@ -102,13 +102,13 @@ def test_coordinates_far_from_the_origin_keep_every_digit(tmp_path, ending):
 def test_columns_of_every_type_come_back(tmp_path, ending, column):
     before = rb.Footprints.of(SQUARES, crs=CRS, attributes={"a": column})
     after = there_and_back(before, tmp_path / f"out.{ending}").attributes["a"]
-    for mine, theirs, masked in zip(np.ma.getdata(column), after, np.ma.getmaskarray(column), strict=True):
-        if masked or pd.isna(mine):
+    for own, theirs, masked in zip(np.ma.getdata(column), after, np.ma.getmaskarray(column), strict=True):
+        if masked or pd.isna(own):
             assert pd.isna(theirs)
         elif column.dtype.kind == "M":
-            assert pd.Timestamp(theirs) == pd.Timestamp(mine)
+            assert pd.Timestamp(theirs) == pd.Timestamp(own)
         else:
-            assert theirs == mine
+            assert theirs == own
 
 
 @pytest.mark.parametrize("ending", ["gpkg", "parquet"])
@@ -161,7 +161,7 @@ def test_equal_sets_give_equal_bytes(tmp_path):
 # Layers
 
 
-def test_layers_are_told_apart(tmp_path):
+def test_layers_are_read_by_name(tmp_path):
     both = {"a": (np.array(SQUARES[:1], dtype=object), {}), "b": (np.array(SQUARES[1:], dtype=object), {})}
     write_layers(both, tmp_path / "two.gpkg", crs=CRS)
     assert len(rb.read_footprints(f"{tmp_path}/two.gpkg|layername=b")) == 2
@@ -264,7 +264,7 @@ def test_a_transformation_keeps_x_before_y(geojson):
     assert 5.7e6 < ymin < 5.8e6
 
 
-def test_coordinates_in_another_crs_than_named_are_told(geojson):
+def test_coordinates_in_another_crs_than_named_are_refused(geojson):
     nonsense = {"type": "Polygon", "coordinates": [[[4, 89], [5, 89], [5, 95], [4, 89]]]}
     with pytest.raises(CRSError, match="cannot be transformed"):
         rb.read_footprints(geojson((nonsense, {}), crs="EPSG:4258"), to_crs=CRS)
@@ -297,7 +297,7 @@ def _frame(crs):
         ("text.parquet", "hello", "cannot be read as GeoParquet"),
     ],
 )
-def test_a_file_that_is_no_vector_file_is_told_in_one_line(tmp_path, name, content, message):
+def test_a_file_that_is_no_vector_file_is_refused_in_one_line(tmp_path, name, content, message):
     if content is not None:
         (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=message) as caught:
@@ -317,7 +317,7 @@ def test_a_folder_is_no_file(tmp_path):
         rb.read_footprints(tmp_path)
 
 
-def test_a_layer_without_polygons_is_told(geojson):
+def test_a_layer_without_polygons_is_refused(geojson):
     with pytest.raises(InputError, match="no polygons among 1 features"):
         rb.read_footprints(geojson(({"type": "Point", "coordinates": [1, 2]}, {})))
 
@@ -351,12 +351,12 @@ def test_a_shapefile_is_replaced_with_its_side_files(tmp_path):
         ("no/out.gpkg", "there is no folder"),
     ],
 )
-def test_a_file_that_cannot_be_written_is_told(tmp_path, name, message):
+def test_a_file_that_cannot_be_written_is_reported(tmp_path, name, message):
     with pytest.raises(OutputError, match=message):
         rb.write_footprints(rb.Footprints.of(SQUARES, crs=CRS), tmp_path / name)
 
 
-def test_an_unknown_crs_is_told_before_writing(tmp_path):
+def test_an_unknown_crs_is_refused_before_writing(tmp_path):
     with pytest.raises(CRSError, match="'EPSG:999999' is no coordinate reference system"):
         rb.write_footprints(rb.Footprints.of(SQUARES, crs="EPSG:999999"), tmp_path / "out.gpkg")
 

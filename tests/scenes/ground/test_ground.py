@@ -43,7 +43,7 @@ HOUSES = [(1020, 2020, 1032, 2030, 6.0), (1060, 2050, 1072, 2080, 9.0), (1000, 2
 
 @pytest.mark.parametrize("density", [1.0, 4.0])
 @pytest.mark.parametrize(("terrain", "worst"), [(flat, 0.2), (steep, 0.4), (hill, 1.2)])
-def test_houses_are_taken_off_any_terrain(terrain, worst, density):
+def test_houses_are_removed_from_any_terrain(terrain, worst, density):
     points, truth = town(terrain, HOUSES, density=density)
     error = ground_surface(points, EXTENT).sample(points.x, points.y) - truth
     # Below the house on the hill top the ground is interpolated through a bend.
@@ -51,14 +51,14 @@ def test_houses_are_taken_off_any_terrain(terrain, worst, density):
     assert np.percentile(np.abs(error), 97) < 0.15
 
 
-def test_a_hall_as_wide_as_the_largest_object_is_taken_off_whole():
+def test_a_hall_as_wide_as_the_largest_object_is_removed_whole():
     points, truth = town(flat, [(1030, 2015, 1120, 2105, 9.0)])
     error = ground_surface(points, EXTENT, largest_object=100).sample(points.x, points.y) - truth
     assert np.abs(error).max() < 0.3
 
 
 @pytest.mark.parametrize("terrain", [flat, steep])
-def test_a_house_at_the_slanting_edge_of_the_coverage_is_taken_off_and_the_ground_beyond_it_stays_near(terrain):
+def test_a_house_at_the_slanting_edge_of_the_coverage_is_removed_and_the_ground_beyond_it_is_kept(terrain):
     # Flight strips do not end parallel to the grid: the house's side towards the gap has no wall and no ground.
     points, truth = town(terrain, [(1010, 2030, 1045, 2065, 8.0)])
     covered = points.x - 1000 > 0.7 * (points.y - 2000)
@@ -70,7 +70,7 @@ def test_a_house_at_the_slanting_edge_of_the_coverage_is_taken_off_and_the_groun
     assert ground.values.max() < truth.max() + 5
 
 
-def test_a_large_building_at_an_angle_is_taken_off_although_windows_fit_its_middle_first():
+def test_a_large_building_at_an_angle_is_removed_although_windows_fit_its_middle_first():
     # A tower block of 52 x 40 m turned by 27 degrees: each window reaches further into its corners.
     points, truth = town(flat)
     block = rotate(box(1050, 2040, 1102, 2080), 27)
@@ -202,7 +202,7 @@ BLOCKS = [(20 + 110 * i, 20 + 110 * j, 118 + 110 * i, 118 + 110 * j, 18) for i i
     ],
     ids=["hall of 300 m x 100 m", "roof of 6 800 m2", "the same on relief", "city blocks on two thirds of the land"],
 )
-def test_wide_roofs_of_closed_surfaces_are_taken_off(size, roofs, relief, smooth):
+def test_wide_roofs_of_closed_surfaces_are_removed(size, roofs, relief, smooth):
     below_roofs, elsewhere = closed_surface(size, roofs, smooth=smooth, relief=relief)
     assert np.median(below_roofs) < 0.9
     assert np.abs(below_roofs).max() < 2.5

@@ -97,7 +97,7 @@ class open_always:
 # What works
 
 
-def test_everything_given_is_taken_as_it_is(files, bring):
+def test_every_given_layer_is_used_unchanged(files, bring):
     code, out, err = bring(
         "points.laz", "ortho.tif", "--dem", "dem.tif", "--reference", "reference.gpkg", "--area", "area.gpkg",
         "--building-id", "building_id", "--source", "a survey", "--licence", "CC0-1.0",
@@ -116,7 +116,7 @@ def test_everything_given_is_taken_as_it_is(files, bring):
     assert err == "- dem.tif: 0.1% of its cells had no height and were interpolated\n"
 
 
-def test_a_dem_is_derived_from_ground_points_and_said_to_be(files, bring):
+def test_a_dem_is_derived_from_ground_points_with_a_note(files, bring):
     code, _, err = bring("points.laz")
     assert code == 0
     assert "the DEM was derived from the points of classes 2 (ground) and 9 (water)" in err
@@ -348,7 +348,7 @@ def test_points_without_crs_take_the_one_named_and_say_so(files, bring):
     assert rb.open_scene(files / "out").crs == CRS
 
 
-def test_notes_are_kept_but_not_told_when_quiet(files, bring):
+def test_notes_are_kept_but_not_printed_when_quiet(files, bring):
     code, out, printed = bring("points.laz", "-q")
     assert (code, printed) == (0, "")
     assert "scene 'out'" in out

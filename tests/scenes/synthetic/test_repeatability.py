@@ -1,4 +1,4 @@
-"""One recipe and one seed are one scene, bit for bit, wherever it is made; one knob moves one thing."""
+"""One recipe and one seed are one scene, bit for bit, wherever it is made; each parameter changes one thing."""
 
 import os
 import subprocess
@@ -76,7 +76,7 @@ def test_there_are_as_many_trees_as_asked_for(density):
         {"clutter": 0},
     ],
 )
-def test_a_knob_that_is_not_about_buildings_leaves_them_in_place(change):
+def test_a_parameter_that_is_not_about_buildings_leaves_them_in_place(change):
     plain, turned = (
         rb.make_scene("fairfield-small", seed=3, digitised="ground", **more).reference for more in ({}, change)
     )
@@ -99,6 +99,6 @@ def test_fewer_buildings_are_among_more_buildings():
     assert all(polygon.wkt in texts for polygon in few.polygons)
 
 
-def test_the_name_tells_preset_seed_and_what_was_changed():
+def test_the_name_holds_preset_seed_and_changes():
     assert rb.make_scene("knox-small", seed=3, tree_density=40).name == "knox-small-3[tree_density=40.0]"
-    assert scene_of(preset("knox-small"), seed=1, name="mine").name == "mine"
+    assert scene_of(preset("knox-small"), seed=1, name="own").name == "own"
