@@ -1,7 +1,7 @@
 """Redrawn references: how far the indices move when the reference is digitised again.
 
-A reference is drawn by hand, with an error. Two detections whose scores differ by less than what another drawing of
-the same buildings would change is not significant with this reference.
+A reference is drawn by hand, with an error. A difference between two detections is not significant where
+another drawing of the same buildings would change the scores by more.
 """
 
 from __future__ import annotations

@@ -37,6 +37,8 @@ class Shrunk{kind}(Shrunk, {kind}):
     name = "shrunk-{name}"
 """
 DETECTORS = {"ndsm": "NDSM", "original": "Original", "improved": "Improved", "mpp": "MPP"}
+#: Parameters of a detector in the suite.
+PARAMETERS = {"mpp": "[level=part]"}
 
 
 def roofbench(*words):
@@ -53,7 +55,8 @@ def main(folder):
     roofbench("baseline", "save", "-o", baseline, "--overwrite", *store)
     roofbench("gate", baseline, *store)
     for name, kind in DETECTORS.items():
-        roofbench("gate", baseline, "-d", f"{plugin}:Shrunk{kind}", "--against", name, *store)
+        shrunk, label = f"{plugin}:Shrunk{kind}{PARAMETERS.get(name, '')}", name + PARAMETERS.get(name, "")
+        roofbench("gate", baseline, "-d", shrunk, "--against", label, *store)
     doubled = [item for name in ("original", "improved") for item in ("-d", f"{name}[corner_product=0.4]")]
     roofbench("gate", baseline, *doubled, *store)
     # By default segments that stray from their line are split, which the papers do not do: missed corners are repaired.
