@@ -113,7 +113,7 @@ def test_roofs_of_a_noisy_cloud_are_found_as_its_ground_shows_the_noise(noise):
     house = rectangle(14, 9, 20)
     place = Place().roof(house).tree(translate(CENTRE, 18, 10).buffer(5))
     place.z += place.rng.normal(0, noise, len(place.z))
-    found = NDSM().detect(place.scene(told_returns=False), RNG)
+    found = NDSM().detect(place.scene(numbered=False), RNG)
     assert len(found) == 1
     assert iou(found.polygons[0], house) > 0.85
 
