@@ -19,16 +19,18 @@ from ..detectors.base import Detector
 from ..evaluators.base import Evaluation, Evaluator
 from ..scenes.builtin import hamlet
 from ..scenes.geodata.footprints import Footprints
-from ..scenes.scene import Scene
+from ..scenes.scene import NEUTRAL_NAME, Scene
 from .execution.isolation import IsolatedProcess
 from .execution.tasks import Task
-from .execution.worker import detect
+from .execution.worker import detect, random_stream
 from .identity.recipes import PluginRecipe, SceneRecipe
 from .store.outcomes import Outcome
 
 __all__ = ["Check", "check_detector", "check_evaluator", "check_plugin"]
 
 _SECONDS = 300.0
+#: Names of generated scenes, with which a detector is tried on other measurements.
+_BAITS = ("knox-small-1", "hamlet-2")
 _ELSEWHERE = "works in another process, with the same result"
 
 
@@ -60,6 +62,7 @@ def check_detector(detector: Detector) -> list[Check]:
         _check("the same seed gives the same footprints", lambda: _repeats(detector, scene)),
         _check("`stochastic` matches the behaviour", lambda: _stochastic(detector, scene)),
         _check("leaves the scene as it was", lambda: "" if _digest(scene) == before else "it changed the arrays"),
+        _check("does not use the name of the scene", lambda: _ignores_names(detector, scene)),
         _check("a scene without buildings is no error", lambda: _found(detector, _meadow(scene))),
         _check(_ELSEWHERE, lambda: _as_here(elsewhere, detector, scene)),
     ]
@@ -130,6 +133,29 @@ def _stochastic(detector: Detector, scene: Scene) -> str:
     if detector.stochastic and not differ:
         return "another seed gives the same footprints: set stochastic = False"
     return ""
+
+
+def _ignores_names(detector: Detector, scene: Scene) -> str:
+    """Try the detector on the scene under names from which a generator could make the truth of another scene."""
+    expected = _wkb_under(NEUTRAL_NAME, detector, scene)
+    for name in _BAITS:
+        try:
+            same = _wkb_under(name, detector, scene) == expected
+        except Exception:
+            same = False
+        if not same:
+            return (
+                f"under the name {name!r} it finds other footprints in the same measurements: a name leads to the "
+                "reference, so scenes have none in a run"
+            )
+    return ""
+
+
+def _wkb_under(name: str, detector: Detector, scene: Scene) -> list[bytes]:
+    seen = scene.for_detection()
+    seen.name = name
+    found: list[bytes] = shapely.to_wkb(detector.detect(seen, random_stream(0, scene, detector)).polygons).tolist()
+    return found
 
 
 def _digest(scene: Scene) -> str:

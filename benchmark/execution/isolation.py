@@ -19,9 +19,11 @@ import threading
 import time
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import IO
 
 from ...core.memory import bound_allocations, highest_memory, tree_memory
+from ...core.package import FOLDER
 from ...core.processes import (
     Limits,
     clean_environment,
@@ -121,7 +123,7 @@ class IsolatedProcess:
         if self._process is None:
             path = self._python_path
             if path is None:
-                path = os.pathsep.join(entry for entry in sys.path if entry)
+                path = _search_path()
             self._folder = tempfile.TemporaryDirectory(prefix="roofbench-")
             self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
@@ -136,6 +138,13 @@ class IsolatedProcess:
                 start_new_session=True,  # Ctrl-C reaches the caller only, which ends its workers
             )
         return self._process
+
+
+def _search_path() -> str:
+    """Return where modules are found, without the working folder (unless roofbench lies there)."""
+    here = Path.cwd().resolve()
+    kept = [entry for entry in sys.path if entry and (Path(entry).resolve() != here or here == FOLDER.parent)]
+    return os.pathsep.join(kept)
 
 
 def _unevaluated(detected: bytes, task: str, reason: str) -> Outcome:
