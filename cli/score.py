@@ -1,39 +1,53 @@
-"""``roofbench score``: evaluate stored detections again."""
+"""``roofbench score``: evaluate stored detections again, or footprints that were made elsewhere."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from . import completion
+from ..core.errors import ParameterError
 from .command import load_plugins
 from .console import messages, table_console
 from .options import (
     DEFAULT_STORE,
     DetectorsOption,
+    EvaluatorsOption,
     FormatOption,
     IndexOption,
     PluginOption,
     ScenesOption,
     StoreOption,
+    SuiteOption,
     WideOption,
 )
+
+if TYPE_CHECKING:
+    from ..benchmark.plan import KeyedEvaluator
+    from ..benchmark.store.records import RunRow
+    from ..benchmark.store.writer import Store
+    from ..benchmark.suite import Suite
 
 __all__ = ["score"]
 
 
 def score(
-    evaluator: Annotated[
-        list[str],
-        typer.Option(
-            "--evaluator",
-            "-e",
-            metavar="EVALUATOR",
-            help="NAME or 'NAME[parameter=value,...]'; repeat for more.",
-            autocompletion=completion.evaluators,
-        ),
-    ],
+    evaluator: EvaluatorsOption = None,
+    footprints: Annotated[
+        Path | None,
+        typer.Option("--footprints", metavar="FOLDER", help="Folder with one vector file for each scene of --suite."),
+    ] = None,
+    suite: SuiteOption = None,
+    label: Annotated[
+        str, typer.Option("--label", metavar="NAME", help="Name of these footprints in tables [name of the folder].")
+    ] = "",
+    check: Annotated[
+        bool, typer.Option("--check", help="Only say which files are missing or cannot be used; nothing is stored.")
+    ] = False,
     detectors: DetectorsOption = None,
     scenes: ScenesOption = None,
     index: IndexOption = None,
@@ -42,35 +56,99 @@ def score(
     store: StoreOption = DEFAULT_STORE,
     plugin: PluginOption = None,
 ) -> None:
-    """Evaluate stored detections with other evaluators and print their leaderboards; no detector runs again.
+    """Evaluate stored detections with other evaluators, or footprints made elsewhere, and print leaderboards.
 
-    Exit code 3 when an evaluator failed on a run, 4 when there is nothing to evaluate.
+    Exit code 2 when --check finds a problem, 3 when runs or evaluators failed, 4 when there is nothing to evaluate.
     """
-    from ..benchmark.analysis.leaderboard import make_leaderboard
-    from ..benchmark.execution.runner import score_stored
     from ..benchmark.plan import KeyedEvaluator
     from ..benchmark.store.writer import Store
+    from ..benchmark.suite import suite_of_words
     from ..evaluators.registry import make_evaluator
-    from ..reports.leaderboard_text import print_unsuccessful, show_leaderboards
 
     load_plugins(plugin)
-    evaluators = tuple(KeyedEvaluator.of(make_evaluator(name)) for name in evaluator)
-    with Store(store, must_exist=True) as opened:
-        rows = opened.runs(detector=detectors, scene=scenes)[::-1]
-        good = [row.id for row in rows if row.status == "ok"]
-        for keyed in evaluators:
-            known = opened.evaluated(good, keyed.key)
-            for run_id in good:
-                if run_id not in known:
-                    score_stored(opened, run_id, (keyed,))
-        boards = [
-            make_leaderboard(rows, opened, keyed, title=f"Stored runs of {store}", rank_by=index)
-            for keyed in evaluators
-        ]
-        show_leaderboards(boards, form, table_console(), wide=wide)
+    if footprints is None:
+        if suite is not None or check or label:
+            raise ParameterError("suite=, label= and check=True belong to footprints=: name the folder with the files")
+        if not evaluator:
+            raise ParameterError("name an evaluator by evaluator=, or footprints made elsewhere by footprints=")
+        evaluators = tuple(KeyedEvaluator.of(make_evaluator(name)) for name in evaluator)
+        with Store(store, must_exist=True) as opened:
+            rows = opened.runs(detector=detectors, scene=scenes)[::-1]
+            _show(opened, rows, evaluators, form, index=index, wide=wide, title=f"Stored runs of {store}")
+        return
+    if suite is None:
+        raise ParameterError("footprints= needs a suite=: the scenes that the files belong to")
+    chosen = suite_of_words([suite], evaluators=evaluator)
+    if scenes is not None:
+        chosen = chosen.with_scenes(scenes)
+    if check:
+        _check(chosen, footprints)
+        return
+    with Store(store) as opened:
+        others, own = _contributed(opened, chosen, footprints, label)
+        rows, failed = [*others, *own], [row for row in own if row.status == "failed"]
+        evaluators = tuple(KeyedEvaluator.of(one) for one in chosen.evaluators)
+        _show(opened, rows, evaluators, form, index=index, wide=wide, title=f"Suite {chosen.name}", failed=failed)
+
+
+def _contributed(store: Store, suite: Suite, folder: Path, label: str) -> tuple[list[RunRow], list[RunRow]]:
+    """Run the footprints of a folder; return the other stored rows of the same scenes, and theirs."""
+    from ..benchmark.contribution import contribution_suite
+    from ..benchmark.execution.runner import Execution, run_plan
+    from ..benchmark.plan import make_plan, plan_content
+    from .progress import run_progress
+
+    suite = contribution_suite(suite, folder, label=label)
+    plan = make_plan(suite, store)
+    store.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
+    with run_progress(plan, messages()) as report:
+        result = run_plan(plan, store, execution=Execution(jobs=1), progress=report)
+    keys = {run.identity.scene_key for run in plan.runs}
+    labels = {row.label for row in result.rows}
+    others = [row for row in store.runs()[::-1] if row.scene_key in keys and row.label not in labels]
+    return others, list(result.rows)
+
+
+def _check(suite: Suite, folder: Path) -> None:
+    """Print what is missing, and leave with exit code 2 where something is."""
+    from ..benchmark.contribution import contribution_problems
+
+    problems = dict(contribution_problems(suite, folder))
+    for name, problem in problems.items():
+        typer.echo(f"{name}: {problem or 'ok'}")
+    wrong = sum(map(bool, problems.values()))
+    typer.echo(f"{len(suite.scenes)} scenes, {wrong} problems")
+    if wrong:
+        raise typer.Exit(2)
+
+
+def _show(
+    store: Store,
+    rows: list[RunRow],
+    evaluators: tuple[KeyedEvaluator, ...],
+    form: Literal["table", "csv", "md", "json"],
+    *,
+    index: str | None,
+    wide: bool,
+    title: str,
+    failed: Sequence[RunRow] = (),
+) -> None:
+    """Evaluate what lacks an evaluation, and print a leaderboard for each evaluator."""
+    from ..benchmark.analysis.leaderboard import make_leaderboard, unsuccessful_runs
+    from ..benchmark.execution.runner import score_stored
+    from ..reports.leaderboard_text import print_unsuccessful, show_leaderboards
+
+    good = [row.id for row in rows if row.status == "ok"]
+    for keyed in evaluators:
+        known = store.evaluated(good, keyed.key)
+        for run_id in good:
+            if run_id not in known:
+                score_stored(store, run_id, (keyed,))
+    boards = [make_leaderboard(rows, store, keyed, title=title, rank_by=index) for keyed in evaluators]
+    show_leaderboards(boards, form, table_console(), wide=wide)
     unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
-    print_unsuccessful(unevaluated, messages())
-    if unevaluated:
+    print_unsuccessful([*unsuccessful_runs(failed), *unevaluated], messages())
+    if unevaluated or failed:
         raise typer.Exit(3)
     if not good:
         raise typer.Exit(4)

@@ -27,6 +27,7 @@ from ...core.processes import Limits, death_reason
 from ...core.program import run_program
 from ...scenes.folder import save_scene
 from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.las_files import write_points
 from ...scenes.scene import INPUTS, Scene
 from ..base import Detector
 from .external_paths import absolute_words, content_digest, split_words
@@ -46,6 +47,7 @@ _RECIPE_CODE = (
     "detectors/shared/regularise.py",
     "scenes/geodata/outlines.py",
 )
+_CSV = ("x", "y", "z", "return_number", "number_of_returns", "intensity")
 _PLACES = ("{scene}", "{parameters}", "{output}")
 
 
@@ -67,6 +69,11 @@ class Command(Detector):
     inputs: str = parameter("points", doc="inputs that a scene must have, separated by spaces: points, image, ...")
     files: str = parameter("", doc="further files and folders that the result depends on, such as a trained model")
     packages: str = parameter("", doc="Python packages whose version the result depends on")
+    points: Literal["laz", "las", "csv"] = parameter(
+        "laz",
+        choices=("laz", "las", "csv"),
+        doc="format of the points; las (not compressed) and csv are written beside points.laz",
+    )
     output: Literal["geojson", "gpkg", "fgb"] = parameter(
         "geojson", choices=("geojson", "gpkg", "fgb"), doc="file format in which the program writes footprints"
     )
@@ -131,6 +138,7 @@ class Command(Detector):
             work.mkdir()
             parameters, output = folder / "parameters.json", work / f"footprints.{self.output}"
             save_scene(scene, folder / "scene")
+            _write_points(scene, folder / "scene" / f"points.{self.points}")
             seeds = {} if seed is None else {"seed": seed}
             # One value a line: a shell script reads them by sed.
             parameters.write_text(json.dumps({**_settings(self.settings), **seeds}, indent=1) + "\n", encoding="utf-8")
@@ -183,6 +191,20 @@ def _settings(text: str) -> dict[str, Any]:
         except json.JSONDecodeError:
             values[name] = value
     return values
+
+
+def _write_points(scene: Scene, file: Path) -> None:
+    """Write the points for programs that cannot read LAZ; CSV holds coordinates, returns and intensity."""
+    cloud = scene.points
+    if cloud is None or file.exists():
+        return
+    if file.suffix == ".las":
+        write_points(cloud, file, crs=scene.crs)
+        return
+    import pandas as pd  # slow to load
+
+    columns = {name: getattr(cloud, name) for name in _CSV if getattr(cloud, name) is not None}
+    pd.DataFrame(columns).to_csv(file, index=False, float_format="%.3f")
 
 
 def _version(package: str) -> str:

@@ -21,14 +21,15 @@ __all__ = ["main"]
 
 _BUILDING = 4
 _SCRIPT = """set -e
-v.in.ascii -zt --quiet input=all.txt output=all separator=space x=1 y=2 z=3
-v.in.ascii -zt --quiet input=first.txt output=first separator=space x=1 y=2 z=3
-g.region --quiet vector=all res={step} -a
-v.lidar.edgedetection --quiet input=all output=edges ew_step={step} ns_step={step} lambda_g=0.5
-v.lidar.growing --quiet input=edges output=grown first=first
-v.lidar.correction --quiet input=grown output=corrected terrain=terrain
-v.out.ascii --quiet input=corrected layer=2 type=point format=point output=corrected.txt separator=space
-v.out.ascii --quiet input=terrain type=point format=point output=terrain.txt separator=space
+export GRASS_VERBOSE=0
+v.in.ascii -zt input=all.txt output=all separator=space x=1 y=2 z=3
+v.in.ascii -zt input=first.txt output=first separator=space x=1 y=2 z=3
+g.region vector=all res={step} -a
+v.lidar.edgedetection input=all output=edges ew_step={step} ns_step={step} lambda_g=0.5
+v.lidar.growing input=edges output=grown first=first
+v.lidar.correction input=grown output=corrected terrain=terrain
+v.out.ascii input=corrected layer=2 type=point format=point output=corrected.txt separator=space
+v.out.ascii input=terrain type=point format=point output=terrain.txt separator=space
 """
 
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import stat
 import sys
 import time
@@ -358,15 +357,3 @@ def test_recipes_run_or_say_what_is_missing(recipe, tmp_path):
     if recipe == "grass":  # it needs pulses with several returns
         return
     assert found.areas.sum() == pytest.approx(12 * 16, rel=0.25)
-
-
-SHELL = """
-height=$(sed -n 's/^ *"height": *\\([0-9.]*\\).*/\\1/p' "$2")
-gdal_calc.py --quiet -A "$1/dem.tif" --outfile=high.tif --calc="A>$height" --type=Byte
-gdal_polygonize.py -q high.tif -f GeoJSON "$3"
-"""
-
-
-@pytest.mark.skipif(shutil.which("gdal_polygonize.py") is None, reason="gdal_polygonize.py (gdal-bin) is not installed")
-def test_gdal_in_a_few_lines_of_shell(program, scene):
-    assert len(rb.detect(scene, program(SHELL, settings="height=-1000", inputs="dem")))

@@ -1,0 +1,132 @@
+"""Footprints made elsewhere: blind scenes out, one file a scene in, the same store and leaderboard."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import shapely
+from harness.command_line import roofbench
+
+import roofbench as rb
+from roofbench.detectors.external.precomputed import Precomputed, file_stem
+from roofbench.scenes.builtin import hamlet
+
+SUITE = """
+[[scenes]]
+preset = "hamlet"
+seeds = [1, 2]
+
+[[scenes]]
+path = "village"
+
+[[detectors]]
+use = "ndsm"
+"""
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A suite of three scenes, and a contribution that finds everything, one metre too far east."""
+    (tmp_path / "my.toml").write_text(SUITE)
+    rb.save_scene(hamlet(3), tmp_path / "village")
+    (tmp_path / "mine").mkdir()
+    for seed in (1, 2, 3):
+        reference = hamlet(seed).reference
+        moved = rb.Footprints.of(
+            shapely.transform(reference.polygons, lambda xy: xy + np.array([1, 0])), crs=reference.crs
+        )
+        rb.write_footprints(moved, tmp_path / "mine" / f"hamlet-{seed}.gpkg")
+    return tmp_path
+
+
+def rows(answer):
+    (board,) = json.loads(answer.stdout)["leaderboards"]
+    return {entry["detector"]: entry for entry in board["entries"] if entry["pooling"] == "pooled"}
+
+
+def test_the_scenes_of_a_suite_are_written_without_what_is_true_of_them(place):
+    printed = roofbench("scenes", "make", "--suite", "my.toml", "-o", "blind", folder=place).stdout
+    assert sorted(folder.name for folder in (place / "blind").iterdir()) == ["hamlet-1", "hamlet-2", "hamlet-3"]
+    assert printed.splitlines()[0] == "blind/hamlet-1: points, image, dem, without reference"
+    for seed in (1, 2, 3):
+        scene = rb.open_scene(place / "blind" / f"hamlet-{seed}")
+        assert (scene.name, scene.reference, scene.area, scene.facts) == (f"hamlet-{seed}", None, None, {})
+        assert len(scene.points) == len(hamlet(seed).points)
+    again = roofbench("scenes", "make", "--suite", "my.toml", "-o", "blind", folder=place, expect=2)
+    assert "exists already" in again.stderr
+    roofbench("scenes", "make", "--suite", "my.toml", "-o", "blind", "--overwrite", folder=place)
+
+
+def test_footprints_enter_the_same_store_and_leaderboard(place):
+    roofbench("run", "my.toml", "-q", folder=place)
+    board = rows(roofbench("score", "--footprints", "mine", "--suite", "my.toml", "-f", "json", folder=place))
+    assert set(board) == {"ndsm", "precomputed:mine"}
+    assert board["precomputed:mine"]["scenes"] == 3
+    assert board["precomputed:mine"]["object.quality"] == 1.0
+    listed = roofbench("ls", folder=place).stdout
+    assert "precomputed:mine" in listed
+    (place / "mine" / "hamlet-1.gpkg").unlink()
+    failed = roofbench("score", "--footprints", "mine", "--suite", "my.toml", folder=place, expect=3)
+    assert "has no footprints of the scene 'hamlet-1': add hamlet-1.gpkg or .geojson" in " ".join(failed.stderr.split())
+
+
+def test_a_changed_file_is_scored_again_and_the_others_are_not(place):
+    def done():
+        roofbench("score", "--footprints", "mine", "--suite", "my.toml", "--label", "us", folder=place)
+        return len(roofbench("ls", folder=place).stdout.splitlines())
+
+    first = done()
+    assert done() == first
+    rb.write_footprints(rb.Footprints.empty(crs=hamlet(1).crs), place / "mine" / "hamlet-1.gpkg", overwrite=True)
+    assert done() == first + 1
+
+
+def test_check_says_what_is_missing_and_stores_nothing(place):
+    complete = roofbench("score", "--footprints", "mine", "--suite", "my.toml", "--check", folder=place)
+    assert complete.stdout.splitlines()[-1] == "3 scenes, 0 problems"
+    (place / "mine" / "hamlet-2.gpkg").rename(place / "mine" / "hamlet_2.gpkg")
+    (place / "mine" / "hamlet-1.gpkg").write_text("nonsense")
+    other = rb.Footprints.of([shapely.box(0, 0, 9, 9)], crs=hamlet(3).crs)
+    rb.write_footprints(other, place / "mine" / "hamlet-3.gpkg", overwrite=True)
+    answer = roofbench("score", "--footprints", "mine", "--suite", "my.toml", "--check", folder=place, expect=2)
+    lines = dict(line.split(": ", 1) for line in answer.stdout.splitlines()[:-1])
+    assert "hamlet-1.gpkg wrote what cannot be used" in lines["hamlet-1"]
+    assert "has no footprints of the scene 'hamlet-2'" in lines["hamlet-2"]
+    assert "outside the extent" in lines["hamlet-3"]
+    assert lines["hamlet_2.gpkg"] == "belongs to no scene of 'my' (did you mean 'hamlet-2'?)"
+    assert answer.stdout.splitlines()[-1] == "3 scenes, 4 problems"
+    assert not (place / "roofbench.sqlite").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--footprints", "mine"), "needs a --suite"),
+        (("--suite", "my.toml"), "name the folder with the files"),
+        ((), "name an evaluator"),
+        (("--footprints", "absent", "--suite", "my.toml"), "is no folder"),
+    ],
+)
+def test_incomplete_requests_are_refused(place, words, reason):
+    assert reason in " ".join(roofbench("score", *words, folder=place, expect=2).stderr.split())
+
+
+def test_a_scene_name_becomes_a_file_name():
+    assert file_stem("knox-small-3[tree_density=40]") == "knox-small-3_tree_density=40"
+    assert file_stem("Straße 5/B") == "Straße_5_B"
+
+
+def test_two_files_for_a_scene_are_refused(place):
+    shutil.copy(place / "mine" / "hamlet-1.gpkg", place / "mine" / "hamlet-1.fgb")
+    with pytest.raises(Exception, match=r"hamlet-1.fgb and hamlet-1.gpkg for the scene 'hamlet-1': keep one"):
+        Precomputed(folder=str(place / "mine")).file_of("hamlet-1")
+
+
+def test_a_subclass_does_not_learn_the_name_of_the_scene(place):
+    class Sly(Precomputed):
+        def footprints_of(self, scene, seen):
+            raise AssertionError("the name reached a plugin")
+
+    with pytest.raises(rb.RoofbenchError, match="found by the name of a scene"):
+        rb.detect(hamlet(1), Sly(folder=str(place / "mine")))
