@@ -18,6 +18,7 @@ __all__ = ["COMMANDS", "LazyGroup"]
 COMMANDS = {
     "run": ("run:run", "Run detectors on scenes and print the leaderboard."),
     "evaluate": ("evaluate:evaluate", "Compare detected with reference footprints."),
+    "compare": ("compare:compare", "Compare two detections of one place, paired."),
     "detect": ("detect:detect", "Detect buildings on one scene."),
     "sweep": ("sweep:sweep", "Vary parameters of detectors or scenes."),
     "report": ("report:report", "Write an HTML report, or compare two stores."),

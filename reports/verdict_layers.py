@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..evaluators.uncertainty.paired import PairedComparison
 from ..evaluators.verdict_table import Verdicts
 from ..scenes.geodata.vector_files import write_layers
 
-__all__ = ["write_verdicts"]
+__all__ = ["write_pair", "write_verdicts"]
 
 
 def write_verdicts(verdicts: Verdicts, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
@@ -22,21 +23,57 @@ def write_verdicts(verdicts: Verdicts, path: str | os.PathLike[str], *, overwrit
     A GeoPackage gets the layers ``detections`` and ``references``; other formats, which hold one layer, get both in
     one, distinguished by the column ``side``.
     """
+    tables = {f"{side}s": (footprints.polygons, verdicts.columns(side)) for side, _, footprints in verdicts.sides}
+    _write(tables, path, crs=verdicts.crs, overwrite=overwrite, column="side", layer="verdicts")
+
+
+def write_pair(found: PairedComparison, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write the fate of each reference in two detections, and the verdicts of both.
+
+    A GeoPackage gets the layers ``references``, ``detections_a`` and ``detections_b``; other formats get all in one,
+    distinguished by the column ``side``.
+
+    Raises
+    ------
+    ValueError
+        The evaluator gives no verdicts.
+    """
+    one, two = found.first.verdicts, found.second.verdicts
+    if one is None or two is None:
+        raise ValueError("an evaluator without verdicts has no objects to write")
+    tables = {
+        "references": (one.reference.polygons, found.references),
+        "detections_a": (one.detected.polygons, one.columns("detection")),
+        "detections_b": (two.detected.polygons, two.columns("detection")),
+    }
+    _write(tables, path, crs=one.crs or two.crs, overwrite=overwrite, column="side", layer="comparison")
+
+
+def _write(
+    tables: Mapping[str, tuple[NDArray[np.object_], Mapping[str, NDArray[Any]]]],
+    path: str | os.PathLike[str],
+    *,
+    crs: str | None,
+    overwrite: bool,
+    column: str,
+    layer: str,
+) -> None:
+    """Write tables as layers of a GeoPackage, else as one layer with a column that names the table."""
     # GDAL takes a GeoJSON property "id" for the feature's own number, which must be unique.
-    tables = [
-        {"source_id" if name == "id" else name: column for name, column in verdicts.columns(side).items()}
-        for side, _, _ in verdicts.sides
-    ]
-    polygons = [footprints.polygons for _, _, footprints in verdicts.sides]
-    if Path(path).suffix.lower() == ".gpkg":
-        layers = {f"{side}s": (polygons[place], tables[place]) for place, (side, _, _) in enumerate(verdicts.sides)}
-    else:
-        for table, (side, _, footprints) in zip(tables, verdicts.sides, strict=True):
-            table["side"] = np.full(len(footprints), side, dtype=object)
-        names = dict.fromkeys(name for table in tables for name in table)
-        columns = {name: _joined([table.get(name) for table in tables], list(map(len, polygons))) for name in names}
-        layers = {"verdicts": (np.concatenate(polygons), columns)}
-    write_layers(layers, path, crs=verdicts.crs, overwrite=overwrite)
+    named = {
+        key: (polygons, {"source_id" if name == "id" else name: values for name, values in table.items()})
+        for key, (polygons, table) in tables.items()
+    }
+    if Path(path).suffix.lower() != ".gpkg":
+        for key, (polygons, table) in named.items():
+            table[column] = np.full(
+                len(polygons), key.replace("detections", "detection").replace("references", "reference"), dtype=object
+            )
+        names = dict.fromkeys(name for _, table in named.values() for name in table)
+        counts = [len(polygons) for polygons, _ in named.values()]
+        columns = {name: _joined([table.get(name) for _, table in named.values()], counts) for name in names}
+        named = {layer: (np.concatenate([polygons for polygons, _ in named.values()]), columns)}
+    write_layers(named, path, crs=crs, overwrite=overwrite)
 
 
 def _joined(columns: Sequence[NDArray[Any] | None], counts: Sequence[int]) -> NDArray[Any]:

@@ -19,6 +19,7 @@ from .curves import curve_panels, draw_curves
 from .evaluation_text import described, evaluation_table
 from .format import shortened
 from .map_elements import add_scale_bar, polygon_paths
+from .places import places_of
 from .verdict_style import ROLE_STYLE, filled_kinds
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry
     figure = Figure(figsize=(13, 8), dpi=100, layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=[2.4, 1], squeeze=False)[0]
     figure.suptitle(shortened(title, 150), x=0.01, ha="left", fontsize=11, parse_math=False)
-    places, total = _places(verdicts)
+    places, total = places_of(np.concatenate([footprints.polygons for _, _, footprints in verdicts.sides]))
     columns = math.ceil(math.sqrt(len(places)))
     grid = left.subplots(math.ceil(len(places) / columns), columns, squeeze=False)
     for axes in grid.flat:
@@ -125,30 +126,6 @@ def draw_verdicts(
         handles.append(Patch(facecolor="none", edgecolor="#555555", linestyle="--", label="evaluation area"))
     add_scale_bar(axes)
     return handles
-
-
-def _places(verdicts: Verdicts) -> tuple[list[tuple[float, float, float, float] | None], int]:
-    """Return the extents to draw, at most nine, and how many there are: one, unless footprints are too small to see."""
-    every = np.concatenate([footprints.polygons for _, _, footprints in verdicts.sides])
-    if not len(every):
-        return [None], 1
-    xmin, ymin, xmax, ymax = shapely.total_bounds(every)
-    span = max(xmax - xmin, ymax - ymin)
-    if np.sqrt(np.median(shapely.area(every))) > span / 300:
-        return [None], 1
-    from scipy import ndimage
-
-    centres = shapely.get_coordinates(shapely.centroid(every))
-    cells = np.floor((centres - [xmin, ymin]) / span * 50).astype(int)
-    occupied = np.zeros((52, 52), dtype=bool)
-    occupied[cells[:, 0], cells[:, 1]] = True
-    label = ndimage.label(occupied, structure=np.ones((3, 3)))[0][cells[:, 0], cells[:, 1]]
-    numbers, counts = np.unique(label, return_counts=True)
-    extents = [tuple(shapely.total_bounds(every[label == number])) for number in numbers[np.argsort(-counts)]]
-    covered = sum((extent[2] - extent[0]) * (extent[3] - extent[1]) for extent in extents[:9])
-    if covered > 0.3 * (xmax - xmin) * (ymax - ymin):
-        return [None], 1
-    return list(extents[:9]), len(extents)
 
 
 def _draw_group(axes: Axes, polygons: NDArray[np.object_], kind: VerdictKind, window: shapely.Geometry) -> Patch:

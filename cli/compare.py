@@ -1,0 +1,103 @@
+"""``roofbench compare``: two detections of one place, paired."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from .footprint_inputs import check_targets, print_problems, read_truth, short_name
+from .options import (
+    FORMAT_HELP,
+    BuildingIdOption,
+    CrsOption,
+    EvaluationAreaOption,
+    EvaluatorOption,
+    JoinGapsOption,
+    OverwriteOption,
+    QuietOption,
+)
+
+__all__ = ["compare"]
+
+
+def compare(
+    first: Annotated[str, typer.Argument(metavar="A", help="Detected footprints; 'FILE.gpkg|layername=NAME'.")],
+    second: Annotated[str, typer.Argument(metavar="B", help="Other detected footprints of the same place.")],
+    reference: Annotated[
+        str,
+        typer.Argument(
+            metavar="REFERENCE", help="Reference footprints, or a scene folder (its reference, area and pixel grid)."
+        ),
+    ],
+    evaluator: EvaluatorOption = None,
+    evaluation_area: EvaluationAreaOption = None,
+    building_id: BuildingIdOption = None,
+    join_gaps: JoinGapsOption = None,
+    crs: CrsOption = None,
+    interval: Annotated[
+        float, typer.Option("--interval", metavar="PERCENT", help="Level of the intervals of the differences.")
+    ] = 95.0,
+    form: Annotated[Literal["table", "json", "csv", "md"], typer.Option("--format", "-f", help=FORMAT_HELP)] = "table",
+    verdicts: Annotated[
+        Path | None,
+        typer.Option(
+            "--verdicts", metavar="FILE", help="Vector file for what each finds and why (.gpkg: three layers)."
+        ),
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", metavar="FILE", help="Map of what only one finds (.png, .svg, .pdf).")
+    ] = None,
+    overwrite: OverwriteOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Compare two detections of one place: what only one of them finds, and by how much each index differs.
+
+    Differences are B - A, with the interval of a paired bootstrap over connected groups of objects; the objects that
+    only one finds are tested by McNemar's exact test. Two results stores are compared by 'roofbench report --against'.
+    """
+    from ..core.errors import InputError, ParameterError, UnsupportedError
+    from ..evaluators.registry import ALL, DEFAULT
+    from ..evaluators.uncertainty.paired import compare as compared
+    from ..reports.pair_text import format_pair
+    from ..scenes.geodata.vector_files import read_footprints
+
+    if evaluator == ALL:
+        raise ParameterError("two detections are compared by one evaluator at a time: name it by evaluator=")
+    if building_id is not None and join_gaps is not None:
+        raise InputError("blocks of joined footprints have no building ids: set building_id= or join_gaps=, not both")
+    check_targets(verdicts, plot, inputs=(first, second, reference, evaluation_area), overwrite=overwrite)
+    one, two = (read_footprints(path, crs=crs) for path in (first, second))
+    truth = read_truth(reference, building_id=building_id, crs=crs, evaluation_area=evaluation_area)
+    print_problems([one, two], truth, evaluation_area=evaluation_area, quiet=quiet)
+    if join_gaps is not None:
+        truth = truth._replace(footprints=truth.footprints.joined(join_gaps))
+    found = compared(
+        one,
+        two,
+        truth.footprints,
+        evaluator=evaluator or DEFAULT,
+        area=truth.area,
+        grid=truth.grid,
+        interval=interval,
+    )
+    names = (short_name(first), short_name(second), short_name(reference))
+    if found.fates is None and (verdicts is not None or plot is not None):
+        raise UnsupportedError(
+            f"the evaluator {found.evaluator.name!r} gives no verdicts: leave out verdicts= and plot="
+        )
+    if verdicts is not None:
+        from ..reports.verdict_layers import write_pair
+
+        write_pair(found, verdicts, overwrite=overwrite)
+    if plot is not None:
+        from ..reports.figures import save_figure
+        from ..reports.format import shortened
+        from ..reports.pair_map import pair_figure
+
+        title = ", ".join(
+            f"{role}: {shortened(name, 48)}" for role, name in zip(("A", "B", "reference"), names, strict=True)
+        )
+        save_figure(pair_figure(found, title=title, area=truth.area), plot, overwrite=overwrite)
+    typer.echo(format_pair(found, form, names=names))
