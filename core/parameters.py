@@ -7,6 +7,10 @@ An *execution option* is a dataclass field made by `execution_option`: the numbe
 the time and memory of a run and never its result. It is set in the same way, ``name[threads=2]`` or ``-p threads=2``,
 but it is no parameter: keys, labels and sweeps do not see it, and objects that differ in it alone are equal.
 
+A parameter that is *used with* certain values of another one has no effect beside other values. It then has its
+default, whatever was given, so that equal runs have equal keys: ``improved[voting=false,majority=0.7]`` is
+``improved[voting=false]``.
+
 A *mode* is a named set of defaults: `Parameterised.modes` maps values of the parameter ``mode`` to defaults that
 replace those of the fields. A parameter that is given beside the mode overrides it: ``original[mode=paper,rise=0.1]``.
 """
@@ -205,9 +209,13 @@ class Parameterised:
     ----------
     modes : mapping
         Value of the parameter ``mode`` to the defaults that it sets, by parameter; empty for classes without modes.
+    used_with : mapping
+        Parameter to other parameters and those values of them beside which it counts (any of them is enough); the
+        parameters that are absent always count.
     """
 
     modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
+    used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {}
 
     def __new__(cls, *_: Any, **given: Any) -> Self:
         """Note which parameters are given: a mode sets the others."""
@@ -225,6 +233,9 @@ class Parameterised:
                     object.__setattr__(self, name, value)
         for name, rule in {**self.parameters(), **self.execution_options()}.items():
             object.__setattr__(self, name, rule.check(getattr(self, name), owner))
+        defaults = self.defaults() if self.used_with else {}
+        for name in self.unused():
+            object.__setattr__(self, name, self.parameters()[name].check(defaults[name], owner))
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
@@ -278,8 +289,29 @@ class Parameterised:
         return self.modes.get(mode, {}) if isinstance(mode, str) else {}
 
     def replaced(self, values: Mapping[str, Any]) -> Self:
-        """Return a copy with other values; a new mode changes every parameter that has the old mode's default."""
-        return type(self).build({**self.execution_values(), **self.changed(), **values})
+        """Return a copy with other values; a new mode changes every parameter that has the old mode's default.
+
+        Raises
+        ------
+        ParameterError
+            A parameter among `values` has no effect beside the others.
+        """
+        copy = type(self).build({**self.execution_values(), **self.changed(), **values})
+        for name in copy.unused():
+            if name in values:
+                others = self.used_with[name].items()
+                needed = " or ".join(f"{other}={parameter_text(value)}" for other, found in others for value in found)
+                owner = getattr(self, "name", None) or type(self).__name__
+                raise ParameterError(f"{owner}: {name} has no effect here: it is used with {needed}")
+        return copy
+
+    def unused(self) -> list[str]:
+        """Return the names of the parameters that have no effect beside the values of others."""
+        return [
+            name
+            for name, others in self.used_with.items()
+            if all(getattr(self, other) not in values for other, values in others.items())
+        ]
 
     def values(self) -> dict[str, Any]:
         """Return the parameter values by name."""

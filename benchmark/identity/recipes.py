@@ -106,7 +106,7 @@ class SceneRecipe:
         ``shipped`` is a real scene that comes with roofbench; ``spooled`` is a scene of this process that was written
         to a file for other processes; ``memory`` one that stays in this process.
     name : str
-        Name in tables: ``knox-small-3[tree_density=40]``.
+        Name in tables: ``knox-small-3[tree_density=40]``; ``fairfield@1`` where a preset is called ``fairfield-1``.
     place : str
         Folder, name of a shipped scene, preset or file.
     seed : int
@@ -157,7 +157,9 @@ class SceneRecipe:
         """
         values = _checked_parameters(name, parameters or {})
         axes = ",".join(f"{key}={parameter_text(value)}" for key, value in values.items())
-        full_name = f"{name}-{seed}" + (f"[{axes}]" if axes else "")
+        # A preset may have a name that another one with a seed would have: fairfield-1.
+        mark = "@" if f"{name}-{seed}" in preset_names() else "-"
+        full_name = f"{name}{mark}{seed}" + (f"[{axes}]" if axes else "")
         return cls("builtin" if name == _HAMLET else "preset", full_name, name, seed, values)
 
     @classmethod
@@ -196,7 +198,7 @@ class SceneRecipe:
         """The group of the scene: the preset with its parameters but without its seed, else the name."""
         if self.kind not in ("preset", "builtin"):
             return self.name
-        return self.place + self.name.removeprefix(f"{self.place}-{self.seed}")
+        return self.place + self.name[len(f"{self.place}-{self.seed}") :]
 
     @property
     def key(self) -> str:
@@ -209,7 +211,9 @@ class SceneRecipe:
             return digest([self.name, module_closure(_BUILTIN).digest, self.seed])
         if self.kind == "preset":
             values = preset(self.place, **self.parameters).values()
-            return digest([self.name, module_closure(_GENERATOR).digest, values, self.seed])
+            # Random streams follow from the name of the scene itself, in which there is no @.
+            name = f"{self.place}-{self.seed}{self.name[len(f'{self.place}-{self.seed}') :]}"
+            return digest([name, module_closure(_GENERATOR).digest, values, self.seed])
         return digest([self.name, self.content_hash or _open_folder(self._folder or self.place).content_hash])
 
     def open(self) -> Scene:

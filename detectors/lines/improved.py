@@ -72,6 +72,20 @@ class Improved(LineDetector):
         },
     }
 
+    used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+        **LineDetector.used_with,
+        "entropy_level": {"entropy": ("share",)},
+        "vote_length": {"voting": (True,)},
+        "majority": {"voting": (True,)},
+        "edge_blur": {"voting": (True,), "texture": (True,)},
+        "edge_contrast": {"voting": (True,), "texture": (True,)},
+        "texture_margin": {"texture": (True,)},
+        "most_edges": {"texture": (True,)},
+        "area_per_edge": {"texture": (True,)},
+        "peaks": {"texture": (True,)},
+        "peak_ratio": {"texture": (True,)},
+    }
+
     ground: str = parameter(
         "point-dem", choices=("tile-dem", "tile-mode", "point-dem"),
         doc="ground height: DEM under the point, mean DEM of the tile, or most frequent height of the tile's points",

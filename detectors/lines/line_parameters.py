@@ -30,6 +30,11 @@ class LineParameters(Detector):
 
     requires: ClassVar[tuple[str, ...]] = ("points", "colour")
     halo: ClassVar[float] = 150.0
+    used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+        "below_ground": {"ground": ("point-dem",)},
+        "ground_tile": {"ground": ("tile-dem", "tile-mode")},
+        "tile_pixel": {"ground": ("tile-dem", "tile-mode")},
+    }
 
     mode: str = parameter(
         "default", choices=("default", "paper", "program"),

@@ -90,3 +90,26 @@ def test_another_mode_changes_what_was_not_overridden():
 def test_an_unknown_mode_is_refused():
     with pytest.raises(ParameterError, match="mode must be one of default, paper, not 'print'"):
         Reading(mode="print")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Voter(Parameterised):
+    name = "voter"
+    voting: bool = parameter(True)
+    majority: float = parameter(1)
+    used_with: ClassVar = {"majority": {"voting": (True,)}}
+
+
+def test_a_parameter_without_effect_makes_no_other_object():
+    off = Voter(voting=False, majority=0.7)
+    assert off == Voter(voting=False)
+    assert off.values() == {"voting": False, "majority": 1.0}
+    assert isinstance(off.majority, float)
+    assert off.unused() == ["majority"]
+    assert Voter(majority=0.7).changed() == {"majority": 0.7}
+    assert Voter(majority=0.7).replaced({"voting": False}) == Voter(voting=False)
+
+
+def test_a_sweep_over_a_parameter_without_effect_is_refused():
+    with pytest.raises(ParameterError, match="voter: majority has no effect here: it is used with voting=True"):
+        Voter(voting=False).replaced({"majority": 0.7})

@@ -25,7 +25,7 @@ def plugin(tmp_path):
         folder.mkdir()
         (folder / "helper_of_plugin.py").write_text(helper)
         (folder / "plug.py").write_text(source)
-        keys._module_file.cache_clear()
+        keys.module_file.cache_clear()
         sys.path.insert(0, str(folder))
         try:
             return load(folder / "plug.py", f"roofbench_plugin_{folder.name}").Plain

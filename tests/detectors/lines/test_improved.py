@@ -94,3 +94,20 @@ def test_every_kind_of_adjustment_finds_the_house(choice):
 def test_the_detector_is_found_by_name_and_reads_its_switches():
     detector = make_detector("improved[voting=false,entropy_threshold=0.3]")
     assert detector.changed() == {"voting": False, "entropy_threshold": 0.3}
+
+
+OTHER_VALUES = {"tile_pixel": "image", "vote_length": "printed", "peaks": "bins"}
+
+
+@pytest.mark.parametrize("base", [{"voting": False, "texture": False}, {"ground": "tile-mode"}], ids=["plain", "tile"])
+def test_parameters_that_are_declared_without_effect_have_none(base):
+    scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 20)).tree(12, 48, 5.0, LEAVES).build()
+    before = detect(scene, **base)
+    changed = Improved(**base)
+    assert len(changed.unused()) >= 2
+    for name in changed.unused():
+        value = OTHER_VALUES[name] if name in OTHER_VALUES else 1.37 * getattr(changed, name)
+        object.__setattr__(changed, name, value)
+    after = changed.detect(scene.for_detection(), np.random.default_rng(0))
+    assert [polygon.wkb for polygon in after.polygons] == [polygon.wkb for polygon in before.polygons]
+    assert len(before) > 0
