@@ -23,7 +23,7 @@ COMMANDS = {
     "sweep": ("sweep:sweep", "Vary parameters of detectors or scenes."),
     "report": ("report:report", "Write an HTML report, or compare two stores."),
     "plot": ("plot:app", "Draw single figures as PNG, SVG or PDF."),
-    "scenes": ("scenes:app", "Make, import, check, list and show scenes."),
+    "scenes": ("scenes:app", "Make, import, index, check, list and show scenes."),
     "list": ("list:list_names", "List detectors, evaluators, suites, scenes, indices."),
     "info": ("info:info", "Explain one of these names."),
     "new": ("new:new", "Write a detector, evaluator or suite to start from."),

@@ -1,4 +1,4 @@
-"""``roofbench scenes``: the commands that make, import, check, list and show scenes, one file each."""
+"""``roofbench scenes``: the commands that make, import, index, check, list and show scenes, one file each."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import typer
 from .command import Command
 from .scenes_check import check
 from .scenes_import import import_
+from .scenes_index import index
 from .scenes_list import list_scenes
 from .scenes_make import make
 from .scenes_show import show
@@ -15,12 +16,13 @@ __all__ = ["app"]
 
 app = typer.Typer(
     name="scenes",
-    help="Make, import, check, list and show scenes.",
+    help="Make, import, index, check, list and show scenes.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
 )
 app.command("import", cls=Command)(import_)
+app.command("index", cls=Command)(index)
 app.command("make", cls=Command)(make)
 app.command("list", cls=Command)(list_scenes)
 app.command("check", cls=Command)(check)

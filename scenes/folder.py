@@ -10,6 +10,7 @@
     area.gpkg        where the reference is complete, when it is not everywhere
 
 All files but the manifest are optional and in the CRS of the scene. A folder is opened without reading any of them.
+Points, images and DEM of a city lie in many files instead, which ``[[tiles]]`` of the manifest lists (`tile_layers`).
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from .geodata.crs import require_metric
 from .geodata.footprints import Footprints
 from .scene import Scene
 from .shipped import shipped_names, shipped_or_given
+from .tile_layers import checksum, tile_problem, tiled_layers
 
 __all__ = [
     "FILES",
@@ -43,6 +45,7 @@ __all__ = [
     "read_manifest",
     "save_scene",
     "update_checksums",
+    "write_manifest",
 ]
 
 MANIFEST = "scene.toml"
@@ -89,6 +92,7 @@ def open_scene(path: str | os.PathLike[str]) -> Scene:
     sources: dict[str, Any] = {}
     for kind in files:
         sources[kind] = _LayerFile(kind, folder / FILES[kind], files[kind])
+    sources.update(tiled_layers(folder, manifest.get("tiles", ()), manifest.get("crs", "")))
     facts: dict[str, Any] = {key: manifest[key] for key in ("source", "licence", "notes", "derived") if key in manifest}
     facts.update(manifest.get("facts", {}))
     return Scene(
@@ -130,7 +134,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, overwrite: bool = 
             _write_reference(scene.reference, folder / FILES["reference"], scene.crs)
         if scene.area is not None:
             _write_area(scene.area, folder / FILES["area"], scene.crs)
-        _write_manifest(folder, _manifest(scene, folder))
+        write_manifest(folder, _manifest(scene, folder))
 
 
 def read_manifest(path: str | os.PathLike[str]) -> tuple[Path, dict[str, Any]]:
@@ -171,7 +175,11 @@ def changed_files(path: str | os.PathLike[str]) -> list[str]:
     """Return the names of the files whose SHA-256 is not the one in the manifest."""
     folder, manifest = read_manifest(path)
     files: dict[str, Mapping[str, Any]] = manifest.get("files", {})
-    return [FILES[kind] for kind, entry in files.items() if _sha256(folder / FILES[kind]) != entry["sha256"]]
+    listed = {FILES[kind]: entry["sha256"] for kind, entry in files.items()}
+    listed |= {entry["file"]: entry["sha256"] for entry in manifest.get("tiles", ())}
+    return [
+        name for name, digest in listed.items() if not (folder / name).is_file() or checksum(folder / name) != digest
+    ]
 
 
 def update_checksums(path: str | os.PathLike[str]) -> list[str]:
@@ -179,8 +187,8 @@ def update_checksums(path: str | os.PathLike[str]) -> list[str]:
     changed = changed_files(path)
     folder, manifest = read_manifest(path)
     for entry_kind, entry in manifest.get("files", {}).items():
-        entry["sha256"] = _sha256(folder / FILES[entry_kind])
-    _write_manifest(folder, manifest)
+        entry["sha256"] = checksum(folder / FILES[entry_kind])
+    write_manifest(folder, manifest)
     return changed
 
 
@@ -199,7 +207,7 @@ def _manifest(scene: Scene, folder: Path) -> dict[str, Any]:
     files = {}
     for kind, name in FILES.items():
         if (folder / name).exists():
-            files[kind] = {"file": name, "sha256": _sha256(folder / name), **_file_facts(kind, scene)}
+            files[kind] = {"file": name, "sha256": checksum(folder / name), **_file_facts(kind, scene)}
     if files:
         manifest["files"] = files
     if facts:
@@ -237,6 +245,11 @@ def _manifest_problem(manifest: Mapping[str, Any]) -> str | None:
     files = manifest.get("files", {})
     if not isinstance(files, dict):
         return "[files] must be a table"
+    problem = tile_problem(manifest.get("tiles", []))
+    if problem is None and manifest.get("tiles") and not manifest.get("crs"):
+        problem = "a scene of tiles needs its crs"
+    if problem:
+        return problem
     for kind, entry in files.items():
         if kind not in FILES:
             return f"[files.{kind}] is none of {', '.join(FILES)}"
@@ -310,7 +323,8 @@ def _write_area(area: shapely.Geometry, file: Path, crs: str | None) -> None:
     write_layers({"area": (np.array([area], dtype=object), {"id": np.array([0])})}, file, crs=crs)
 
 
-def _write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+    """Write the manifest of a scene folder."""
     import tomli_w
 
     from ..core.output import whole_file
@@ -332,11 +346,6 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
-def _sha256(file: Path) -> str:
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
 def _content_hash(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the digest of the manifest's digests, after checking that the files are still those."""
     changed = changed_files(folder)
@@ -349,4 +358,6 @@ def _content_hash(folder: Path, manifest: Mapping[str, Any]) -> str:
     for kind in FILES:
         if kind in manifest.get("files", {}):
             digest.update(f"{kind} {manifest['files'][kind]['sha256']}\n".encode())
+    for entry in manifest.get("tiles", ()):
+        digest.update(f"{entry['layer']} {entry['file']} {entry['sha256']}\n".encode())
     return digest.hexdigest()

@@ -9,13 +9,10 @@ import numpy as np
 from ...core.errors import InputError
 from ..geodata.las_files import LasHeader, read_points
 from ..geodata.points import PointCloud
-from ..ground.heights import HIGHEST_LAND, LOWEST_LAND
+from ..usable_points import is_land, is_noise
 from .place import Place, extent_text, file_paths
 
 __all__ = ["points_of"]
-
-#: ASPRS classes that mark a return as noise: low and high.
-_NOISE = (7, 18)
 
 
 def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int, int], None] | None) -> PointCloud:
@@ -25,7 +22,7 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
     if len(cloud) == 0:
         raise InputError(f"{names} has no points in {extent_text(place.extent)}: choose another extent=")
     _check_bounds(place, cloud, names)
-    wild = (cloud.z < LOWEST_LAND) | (cloud.z > HIGHEST_LAND)
+    wild = ~is_land(cloud.z)
     if wild.any():
         value = float(cloud.z[wild][0])
         cloud = cloud.take(~wild)
@@ -34,13 +31,12 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
         )
         if len(cloud) == 0:
             raise InputError(f"{names} holds no heights of land: the first is {value:g} m; are they scaled?")
-    if cloud.classification is not None:
-        noise = np.isin(cloud.classification, _NOISE)
-        if noise.any():
-            cloud = cloud.take(~noise)
-            place.log.note(f"{np.count_nonzero(noise)} points of the classes noise (7 and 18) were left out")
-            if len(cloud) == 0:
-                raise InputError(f"{names} holds no points but noise (classes 7 and 18)")
+    noise = is_noise(cloud)
+    if noise.any():
+        cloud = cloud.take(~noise)
+        place.log.note(f"{np.count_nonzero(noise)} points of the classes noise (7 and 18) were left out")
+        if len(cloud) == 0:
+            raise InputError(f"{names} holds no points but noise (classes 7 and 18)")
     distinct = cloud.distinct()
     if len(distinct) < len(cloud):
         place.log.note(f"{len(cloud) - len(distinct)} points that were there twice were left out")

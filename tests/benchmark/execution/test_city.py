@@ -9,7 +9,8 @@ import time
 
 import pytest
 import shapely
-from builders.town import HOUSES, same_footprints, town_folder
+from builders.town import HOUSES, SIDE, SOUTH, WEST, same_footprints, town, town_folder
+from harness.command_line import run
 
 import roofbench as rb
 from roofbench.benchmark.execution.city import City, detect_city
@@ -17,6 +18,8 @@ from roofbench.benchmark.execution.runner import Execution
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.core.errors import OutputError, ParameterError
 from roofbench.detectors.registry import make_detector
+from roofbench.scenes.geodata.las_files import write_points
+from roofbench.scenes.importing.tile_index import index_folder
 
 HERE = Execution(jobs=0)
 NDSM = make_detector("ndsm[cell=0.5]")
@@ -136,3 +139,27 @@ def test_bad_sizes_and_places_are_refused(folder, tmp_path):
         detect(folder, tmp_path / "missing" / "city.fgb")
     with pytest.raises(OutputError, match="file ending"):
         detect(folder, tmp_path / "city.xyz")
+
+
+def test_a_broken_file_costs_its_tiles_alone_and_a_repaired_one_is_computed_then(tmp_path):
+    folder, whole = tmp_path / "tiles", town()
+    folder.mkdir()
+    for n in range(3):
+        column = (WEST + 64 * n, SOUTH, WEST + 64 * n + 64, SOUTH + SIDE)
+        write_points(whole.window(column).points, folder / f"{n}.laz", crs="EPSG:25832")
+    index_folder(folder)
+    complete, output = tmp_path / "complete", tmp_path / "city.fgb"
+    complete.mkdir()
+    detect(folder, complete / "city.fgb")
+    content = (folder / "2.laz").read_bytes()
+    (folder / "2.laz").unlink()
+    code, _, message = run("detect", "ndsm[cell=0.5]", folder, "--tile", 64, "-j", 0, "-o", output)
+    assert code == 3
+    assert "2.laz: no such file" in message
+    assert "tiles failed and are missing" in message
+    assert 0 < len(rb.read_footprints(output)) < len(HOUSES)
+    (folder / "2.laz").write_bytes(content)
+    code, _, message = run("detect", "ndsm[cell=0.5]", folder, "--tile", 64, "-j", 0, "-o", output, "--overwrite")
+    assert code == 0, message
+    assert "finished before" in message
+    assert output.read_bytes() == (complete / "city.fgb").read_bytes()
