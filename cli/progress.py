@@ -107,7 +107,9 @@ def _line(run: PlannedRun, outcome: Outcome) -> str:
 
 
 @contextmanager
-def import_progress() -> Iterator[tuple[Callable[[str], None], Callable[[int, int], None] | None]]:
+def import_progress(
+    what: str = "reading points",
+) -> Iterator[tuple[Callable[[str], None], Callable[[int, int], None] | None]]:
     """Yield a function that prints a note and one that moves the bar, or None without a terminal."""
     if not sys.stderr.isatty():
         yield (lambda sentence: typer.echo(f"- {sentence}", err=True)), None
@@ -121,7 +123,7 @@ def import_progress() -> Iterator[tuple[Callable[[str], None], Callable[[int, in
         def move(done: int, total: int) -> None:
             nonlocal task
             if task is None:
-                task = bar.add_task("reading points", total=total)
-            bar.update(task, completed=done, visible=done < total)
+                task = bar.add_task(what, total=total or None)
+            bar.update(task, completed=done, total=total or None, visible=done != total)
 
         yield (lambda sentence: bar.console.print(f"- {sentence}", markup=False, highlight=False, soft_wrap=True)), move

@@ -1,0 +1,59 @@
+"""``roofbench scenes fetch``: download open data by a recipe, ready for ``scenes import``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import ParameterOption, QuietOption
+from .progress import import_progress
+
+__all__ = ["fetch"]
+
+
+def fetch(
+    recipe: Annotated[
+        str | None, typer.Argument(metavar="RECIPE", help="Recipe by name, or a TOML file; without it, list them.")
+    ] = None,
+    parameter: ParameterOption = None,
+    extent: Annotated[
+        tuple[float, float, float, float] | None,
+        typer.Option("--extent", metavar="XMIN YMIN XMAX YMAX", help="What to fetch, in metres of the recipe's CRS."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Folder of the files.")
+    ] = None,
+    quiet: QuietOption = False,
+) -> None:
+    """Download open data of a mapping agency and print the command that makes a scene of it.
+
+    Interrupted downloads continue. The SHA-256 of each file is recorded at its first download and checked after.
+    """
+    from ..core.errors import ParameterError
+    from ..scenes.fetching import fetch as fetch_files
+    from ..scenes.fetching import import_command, open_data, open_data_names
+
+    if recipe is None:
+        for name in open_data_names():
+            found = open_data(name)
+            typer.echo(f"{name}: {found.title}\n  licence: {found.licence}\n  tried: {found.tried}")
+            for value, meaning in found.values.items():
+                typer.echo(f"  -p {value}=: {meaning}")
+            if found.needs_extent:
+                typer.echo(f"  --extent XMIN YMIN XMAX YMAX: metres in {found.crs}")
+        return
+    chosen = open_data(recipe)
+    if output is None:
+        raise ParameterError("name the folder of the files: output=")
+    with import_progress("downloading") as (note, move):
+        files = fetch_files(
+            chosen,
+            output,
+            values=dict(parameter or ()),
+            extent=extent,
+            note=(lambda _: None) if quiet else note,
+            progress=move,
+        )
+    typer.echo(import_command(chosen, files, extent))
