@@ -105,7 +105,7 @@ def recipe(server, tmp_path, files):
     lines += ["[values]", 'tile = "map sheet"']
     for file in files:
         lines += ["[[files]]", *(f"{key} = {json.dumps(value)}" for key, value in file.items())]
-    path = tmp_path / "mine.toml"
+    path = tmp_path / "own.toml"
     path.write_text("\n".join(lines).replace("SERVER", server.url))
     return open_data(str(path))
 
