@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .options import ParameterOption, QuietOption
 from .progress import import_progress
 
-__all__ = ["fetch"]
+if TYPE_CHECKING:
+    from ..scenes.fetching import OpenData
+
+__all__ = ["fetch", "import_command"]
 
 
 def fetch(
@@ -33,7 +38,7 @@ def fetch(
     """
     from ..core.errors import ParameterError
     from ..scenes.fetching import fetch as fetch_files
-    from ..scenes.fetching import import_command, open_data, open_data_names
+    from ..scenes.fetching import open_data, open_data_names
 
     if recipe is None:
         for name in open_data_names():
@@ -57,3 +62,16 @@ def fetch(
             progress=move,
         )
     typer.echo(import_command(chosen, files, extent))
+
+
+def import_command(recipe: OpenData, files: Mapping[str, list[Path]], extent: tuple[float, ...] | None) -> str:
+    """Return the command that makes a scene of fetched files."""
+    words = ["roofbench", "scenes", "import", "--crs", recipe.crs]
+    for kind, paths in files.items():
+        words += [word for path in paths for word in (f"--{kind}", str(path))]
+    if recipe.building_id and "reference" in files:
+        words += ["--building-id", recipe.building_id]
+    if extent is not None:
+        words += ["--extent", *(f"{value:g}" for value in extent)]
+    words += ["--source", recipe.attribution, "--licence", recipe.licence, "-o", "my-scene"]
+    return shlex.join(words)

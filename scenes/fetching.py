@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import json
 import re
-import shlex
 import tomllib
 import zipfile
 from collections.abc import Callable, Mapping
@@ -27,7 +26,7 @@ from ..core.output import whole_file
 from ..core.registry import nearest_hint
 from .download import download, file_checksum
 
-__all__ = ["RECORD", "OpenData", "fetch", "import_command", "open_data", "open_data_names"]
+__all__ = ["RECORD", "OpenData", "fetch", "open_data", "open_data_names"]
 
 RECORD = "fetched.toml"
 _FOLDER = Path(__file__).resolve().parent / "open_data"
@@ -164,19 +163,6 @@ def fetch(
             raise InputError(f"{path}: the server stops at {file.most} features: choose a smaller extent=")
         found.setdefault(file.kind, []).extend(member for each in paths for member in _unpacked(each, note))
     return found
-
-
-def import_command(recipe: OpenData, files: Mapping[str, list[Path]], extent: tuple[float, ...] | None) -> str:
-    """Return the command that makes a scene of fetched files."""
-    words = ["roofbench", "scenes", "import", "--crs", recipe.crs]
-    for kind, paths in files.items():
-        words += [word for path in paths for word in (f"--{kind}", str(path))]
-    if recipe.building_id and "reference" in files:
-        words += ["--building-id", recipe.building_id]
-    if extent is not None:
-        words += ["--extent", *(f"{value:g}" for value in extent)]
-    words += ["--source", recipe.attribution, "--licence", recipe.licence, "-o", "my-scene"]
-    return shlex.join(words)
 
 
 def _filled_values(

@@ -10,9 +10,10 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
+from roofbench.cli.scenes_fetch import import_command
 from roofbench.core.errors import InputError, ParameterError, UnknownNameError
 from roofbench.scenes.download import download
-from roofbench.scenes.fetching import fetch, import_command, open_data, open_data_names
+from roofbench.scenes.fetching import fetch, open_data, open_data_names
 
 CONTENT = bytes(range(256)) * 4000
 
