@@ -125,7 +125,7 @@ PLAIN = {
     r"says of every object why": "explains why",
     # Also in names: an underscore is no letter.
     r"(?<![a-z])told(?![a-z])": "reported, printed",
-    r"(?<![a-z])mine(?![a-z])": "own",
+    r"^\s*(for )?mine(, \w+)* (=|in) ": "own",
     r"(?<![a-z])judge[sd]?(?![a-z])": "evaluator, evaluates",
     r"(?<![a-z])mend(ed|ing)?(?![a-z])": "repaired",
     r"(?<![a-z])borne(?![a-z])": "tolerated",
