@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from .evaluation_in_parts import evaluate_in_parts, is_large
 from .footprint_inputs import check_targets, print_problems, read_truth, short_name
 from .options import (
     FORMAT_HELP,
@@ -78,6 +79,16 @@ def evaluate(
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE", help="Map of the verdicts (.png, .svg, .pdf).")
     ] = None,
+    parts: Annotated[
+        int | None,
+        typer.Option(
+            "--parts",
+            min=1,
+            metavar="N",
+            help="Compare files that are too large for the memory in about N parts; same result. From 2 million "
+            "footprints on, the number of parts is chosen.",
+        ),
+    ] = None,
     overwrite: OverwriteOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -86,7 +97,7 @@ def evaluate(
     Files may be GeoJSON, GeoPackage, Shapefile, FlatGeobuf or GeoParquet, in a projected CRS in metres.
     """
     from ..core.errors import InputError, ParameterError, UnsupportedError
-    from ..evaluators.registry import ALL, all_evaluators, make_evaluator
+    from ..evaluators.registry import ALL, DEFAULT, all_evaluators, make_evaluator
     from ..reports.evaluation_text import format_evaluation, format_evaluations
     from ..scenes.geodata.vector_files import read_footprints
 
@@ -101,6 +112,30 @@ def evaluate(
         raise InputError("blocks of joined footprints have no building ids: set building_id= or join_gaps=, not both")
     if redraws is not None and reference_error is None:
         raise ParameterError("redraws= needs reference_error=, the digitising error in metres")
+    whole = {
+        "evaluation_area=": evaluation_area,
+        "join_gaps=": join_gaps,
+        "plot=": plot,
+        "interval=": interval,
+        "reference_error=": reference_error,
+        f"evaluator={ALL}": every or None,
+    }
+    needs = [name for name, value in whole.items() if value is not None]
+    if parts is not None and needs:
+        raise InputError(f"{needs[0]} needs whole files in memory: leave it out, or leave out parts=")
+    if parts is not None or (not needs and evaluator in (None, DEFAULT) and is_large((detected, reference))):
+        result = evaluate_in_parts(
+            scorers[0],
+            (detected, reference),
+            parts=parts,
+            building_id=building_id,
+            crs=crs,
+            verdicts=verdicts,
+            overwrite=overwrite,
+            quiet=quiet,
+        )
+        typer.echo(format_evaluation(result, form, title=f"{short_name(detected)} against {short_name(reference)}"))
+        return
     found = read_footprints(detected, crs=crs)
     given_truth = read_truth(reference, building_id=building_id, crs=crs, evaluation_area=evaluation_area)
     print_problems([found], given_truth, evaluation_area=evaluation_area, quiet=quiet)

@@ -85,9 +85,9 @@ class OutlineStore:
         return (self.folder / _DONE).is_file()
 
     @cached_property
-    def facts(self) -> dict[str, object]:
+    def facts(self) -> dict[str, Any]:
         """What `finish` was given: facts of the side that JSON can hold."""
-        content: dict[str, object] = json.loads((self.folder / _DONE).read_text(encoding="utf-8"))
+        content: dict[str, Any] = json.loads((self.folder / _DONE).read_text(encoding="utf-8"))
         return content
 
     def write(self, batches: Iterable[Footprints]) -> None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +31,12 @@ from .wkb import geometries_of_wkb
 
 __all__ = [
     "DRIVERS",
+    "building_column",
+    "named_or_none",
     "output_driver",
     "read_footprints",
     "read_polygon",
+    "readable_layer",
     "split_layer",
     "write_footprints",
     "write_layers",
@@ -118,7 +122,8 @@ def read_footprints(
         geometries, crs = _transformed(file, geometries, crs or to_crs, to_crs), to_crs
     if len(geometries):
         require_metric(crs, str(file), heights=False)
-    identifiers = _building_ids(file, columns, building_id)
+    column = building_column(file, columns, building_id)
+    identifiers = None if column is None else columns[column]
     footprints = Footprints.of(geometries, building_ids=identifiers, crs=crs, attributes=columns, source=str(file))
     reported = {repair.id for repair in footprints.repairs}
     more = [repair for repair in closed if repair.id not in reported]
@@ -218,9 +223,12 @@ def write_layers(
                 _write_ogr(plain, driver, layer, geometries, columns, crs, append=number > 0)
 
 
-def _read_ogr(
-    file: Path, layer: str | None
-) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None, list[Repair]]:
+@contextmanager
+def readable_layer(file: Path, layer: str | None) -> Iterator[tuple[Path, str]]:
+    """Yield the path by which OGR reads a file, and the layer that is named or the only one.
+
+    Errors of OGR inside the block become one sentence.
+    """
     from pyogrio.errors import DataLayerError, DataSourceError
 
     if not (file.is_dir() and file.suffix.lower() == ".gdb"):
@@ -237,20 +245,27 @@ def _read_ogr(
                 raise InputError(
                     f"{file} has no layer {layer!r}{nearest_hint(layer, names)}; it has {', '.join(names)}"
                 )
-            found = read_layer(path, layer or names[0])
+            yield path, layer or names[0]
         except (DataSourceError, DataLayerError) as error:
             reason = " ".join(str(error).partition("; It might help")[0].replace(str(path), str(file)).split())
             raise InputError(f"{file} cannot be read as a vector file: {reason}") from error
+
+
+def _read_ogr(
+    file: Path, layer: str | None
+) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None, list[Repair]]:
+    with readable_layer(file, layer) as (path, name):
+        found = read_layer(path, name)
     if found.wkb is None:
-        raise InputError(f"{file}: no polygons: the layer {layer or names[0]!r} has no geometry")
+        raise InputError(f"{file}: no polygons: the layer {name!r} has no geometry")
     columns = dict(found.columns)
     if file.suffix.lower() == ".shp" and "building_i" in columns:
         columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name
     geometries, closed = geometries_of_wkb(found.wkb, file)
-    return geometries, columns, None if found.crs is None else _named_or_none(found.crs), closed
+    return geometries, columns, None if found.crs is None else named_or_none(found.crs), closed
 
 
-def _named_or_none(crs: str) -> str | None:
+def named_or_none(crs: str) -> str | None:
     """Return the CRS of a file as it is; None for a local or undefined one."""
     return crs if crs.upper().startswith("EPSG:") else crs if file_crs(parse_crs(crs)) is not None else None
 
@@ -319,19 +334,18 @@ def _say_no_crs(file: Path) -> None:
     file.write_text(text.replace(start, f'{start}\n"crs": null,', 1), encoding="utf-8")
 
 
-def _building_ids(file: Path, columns: Mapping[str, NDArray[Any]], name: str | None) -> NDArray[Any] | None:
-    """Return the building of each row; rows without a value get one of their own."""
+def building_column(file: Path, columns: Iterable[str], name: str | None) -> str | None:
+    """Return the column of building ids: the one that is named, or ``building_id`` where there is one."""
+    known = list(columns)
     if name is None:
-        if "building_id" not in columns:
-            return None
-        name = "building_id"
-    if name not in columns and file.suffix.lower() == ".shp" and name[:10] in columns:
+        return "building_id" if "building_id" in known else None
+    if name not in known and file.suffix.lower() == ".shp" and name[:10] in known:
         name = name[:10]
-    if name not in columns:
+    if name not in known:
         raise InputError(
-            f"{file} has no column {name!r}{nearest_hint(name, columns)}; it has {', '.join(columns) or 'none'}"
+            f"{file} has no column {name!r}{nearest_hint(name, known)}; it has {', '.join(known) or 'none'}"
         )
-    return columns[name]
+    return name
 
 
 def _means_degrees(file: Path, geometries: NDArray[np.object_]) -> bool:

@@ -1,0 +1,181 @@
+"""Vector files read in batches: footprints that are too many for the memory.
+
+GeoParquet is read by pyarrow, FlatGeobuf, GeoPackage and the other formats by OGR as a stream of Arrow batches; both
+need the optional dependency ``parquet``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError, UnsupportedError
+from ...core.inputs import require_file
+from ...core.plain_paths import plain_path
+from .crs import file_crs, named_crs, require_metric
+from .footprints import Footprints, Repair
+from .ogr_layers import quiet
+from .vector_files import DRIVERS, building_column, named_or_none, readable_layer, split_layer
+from .wkb import geometries_of_wkb
+
+__all__ = ["FootprintStream", "open_stream"]
+
+#: Features of a batch.
+_BATCH = 1 << 17
+
+
+@dataclass(frozen=True)
+class FootprintStream:
+    """A vector file that is read in batches, from the first feature to the last, as often as one likes.
+
+    Attributes
+    ----------
+    file : Path
+    layer : str or None
+        None of a GeoParquet file.
+    crs : str or None
+    count : int
+        Number of features.
+    schema : pyarrow.Schema
+        All columns, the geometry included.
+    geometry : str
+        Name of the geometry column (WKB).
+    building_id : str or None
+        Column whose equal values mark the parts of one building.
+    """
+
+    file: Path
+    layer: str | None
+    crs: str | None
+    count: int
+    schema: Any
+    geometry: str
+    building_id: str | None
+
+    def batches(self, columns: list[str]) -> Iterator[Any]:
+        """Yield `pyarrow.RecordBatch` of the geometry and these columns."""
+        if self.layer is None:
+            import pyarrow.parquet
+
+            with plain_path(self.file) as path, pyarrow.parquet.ParquetFile(path) as source:
+                yield from source.iter_batches(_BATCH, columns=[self.geometry, *columns])
+            return
+        import pyogrio.raw
+
+        with (
+            readable_layer(self.file, self.layer) as (path, layer),
+            quiet(),
+            pyogrio.raw.open_arrow(path, layer=layer, columns=columns, batch_size=_BATCH, use_pyarrow=True) as found,
+        ):
+            yield from found[1]
+
+    def footprints(self) -> Iterator[tuple[Footprints, Any]]:
+        """Yield clean footprints, and their values in the column `building_id` (None without one).
+
+        Ids and repairs count the features of the file.
+        """
+        first = 0
+        for batch in self.batches([] if self.building_id is None else [self.building_id]):
+            geometries, closed = geometries_of_wkb(self.wkb(batch), self.file)
+            found = Footprints.of(geometries, crs=self.crs, source=str(self.file))
+            reported = {repair.id for repair in found.repairs}
+            repairs = [*found.repairs, *(repair for repair in closed if repair.id not in reported)]
+            labels = None
+            if self.building_id is not None:
+                labels = batch.column(batch.schema.get_field_index(self.building_id)).take(_arrow().array(found.ids))
+            yield (
+                replace(
+                    found,
+                    ids=found.ids + first,
+                    repairs=tuple(Repair(repair.id + first, repair.problem, repair.action) for repair in repairs),
+                ),
+                labels,
+            )
+            first += len(batch)
+
+    def wkb(self, batch: Any) -> NDArray[np.object_]:
+        """Return the geometries of a batch as WKB."""
+        place = batch.schema.get_field_index(self.geometry)
+        column: NDArray[np.object_] = batch.column(place).to_numpy(zero_copy_only=False)
+        return column
+
+
+def open_stream(
+    path: str | os.PathLike[str], *, building_id: str | None = None, crs: str | None = None
+) -> FootprintStream:
+    """Open a vector file to read its footprints in batches; the parameters are those of `read_footprints`.
+
+    Raises
+    ------
+    InputError, CRSError
+        As `read_footprints`; GeoJSON, which is read as a whole only.
+    UnsupportedError
+        pyarrow is not installed.
+    """
+    _arrow()
+    file, layer = split_layer(path)
+    driver = DRIVERS.get(file.suffix.lower())
+    if driver == "GeoJSON":
+        raise InputError(
+            f"{file}: GeoJSON is not read in parts: convert it to FlatGeobuf, GeoPackage or GeoParquet, for instance "
+            "with ogr2ogr"
+        )
+    own_crs, layer, count, schema, geometry = _parquet_parts(file) if driver == "Parquet" else _ogr_parts(file, layer)
+    known = named_crs(crs) if crs is not None else own_crs
+    if count:
+        require_metric(known, str(file), heights=False)
+    names = [name for name in schema.names if name != geometry]
+    return FootprintStream(file, layer, known, count, schema, geometry, building_column(file, names, building_id))
+
+
+def _arrow() -> Any:
+    try:
+        import pyarrow
+    except ImportError as missing:
+        raise UnsupportedError("reading files in parts needs pyarrow: pip install 'roofbench[parquet]'") from missing
+    return pyarrow
+
+
+def _parquet_parts(file: Path) -> tuple[str | None, str | None, int, Any, str]:
+    """Return CRS, layer, number of features, schema and geometry column of a GeoParquet file."""
+    import pyarrow.parquet
+    import pyproj
+
+    require_file(file, "a vector file, for instance .gpkg or .geojson")
+    try:
+        with plain_path(file) as path, pyarrow.parquet.ParquetFile(path) as source:
+            schema, count = source.schema_arrow, source.metadata.num_rows
+        described = json.loads((schema.metadata or {})[b"geo"])
+        geometry = str(described["primary_column"])
+        column = described["columns"][geometry]
+        encoding, crs = column["encoding"], column.get("crs", "OGC:CRS84")
+        parsed = None if crs is None else pyproj.CRS.from_user_input(crs)
+    except (OSError, ValueError, LookupError, TypeError, pyproj.exceptions.CRSError) as error:
+        raise InputError(f"{file} cannot be read as GeoParquet: {' '.join(str(error).split())}") from error
+    if encoding != "WKB":
+        raise InputError(
+            f"{file}: its geometry is encoded as {encoding}, and only WKB is read in parts: rewrite it as WKB"
+        )
+    return None if parsed is None else file_crs(parsed), None, count, schema, geometry
+
+
+def _ogr_parts(file: Path, layer: str | None) -> tuple[str | None, str | None, int, Any, str]:
+    """Return CRS, layer, number of features, schema and geometry column of a file of OGR."""
+    import pyogrio
+    import pyogrio.raw
+
+    with readable_layer(file, layer) as (path, name), quiet():
+        count = int(pyogrio.read_info(path, layer=name, force_feature_count=True)["features"])
+        with pyogrio.raw.open_arrow(path, layer=name, use_pyarrow=True) as (meta, reader):
+            schema = reader.schema
+    geometry = meta["geometry_name"] or "wkb_geometry"
+    if geometry not in schema.names:
+        raise InputError(f"{file}: no polygons: the layer {name!r} has no geometry")
+    return None if meta["crs"] is None else named_or_none(meta["crs"]), name, count, schema, geometry
