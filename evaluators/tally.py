@@ -21,7 +21,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import InputError
 
-__all__ = ["Additive", "Histogram", "Tallies", "histogram"]
+__all__ = ["ADDED", "Additive", "Histogram", "Tallies", "histogram"]
+
+#: Metadata of a field of tallies that older stores lack; it is read as nothing counted, so its indices are undefined.
+ADDED = {"added": True}
 
 
 class Additive(Protocol):
@@ -208,8 +211,12 @@ class Tallies:
     @classmethod
     def _read(cls, rest: dict[str, Any], prefix: str) -> Self:
         values: dict[str, Any] = {}
+        added = {each.name for each in dataclasses.fields(cls) if each.metadata.get("added")}
         for name, default in _defaults(cls).items():
             key = prefix + name
+            if name in added and not any(one.startswith(f"{key}.") for one in rest):
+                values[name] = default
+                continue
             if isinstance(default, Tallies):
                 values[name] = default._read(rest, key + ".")
                 continue

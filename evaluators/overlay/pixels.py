@@ -36,6 +36,7 @@ def pixel_areas(
     *,
     false_positives: NDArray[np.int64],
     false_negatives: NDArray[np.int64],
+    groups: NDArray[np.int64] | None = None,
 ) -> AreaTally:
     """Return T, F and M as pixel counts times the pixel's area, m2.
 
@@ -48,6 +49,8 @@ def pixel_areas(
         Its origin and GSD define the lattice, which continues beyond the image.
     false_positives, false_negatives : ndarray of int64
         Rows of the FP detections and of the FN references.
+    groups : ndarray of int64, optional
+        Group of each TP pair, FP and FN. A pixel counts once in each group; by default once in all.
     """
     # One object per TP pair, FP and FN; channel 0 is its detected, channel 1 its reference side.
     n_pairs, n_fp, n_fn = len(pairs[0]), len(false_positives), len(false_negatives)
@@ -60,7 +63,7 @@ def pixel_areas(
     channel = np.repeat([0, 1, 0, 1], [n_pairs, n_pairs, n_fp, n_fn])
     counted = np.zeros(6)
     for polygon, row, column, sign in _crossings(polygons, grid):
-        counted += _count_band(objects[polygon], channel[polygon], row, column, sign, n_pairs)
+        counted += _count_band(objects[polygon], channel[polygon], (row, column, sign), n_pairs, groups)
     names = (each.name for each in fields(AreaTally))
     return AreaTally(**dict(zip(names, (counted * grid.gsd**2).tolist(), strict=True)))
 
@@ -120,12 +123,12 @@ def _bands(first: NDArray[np.int64], last: NDArray[np.int64]) -> Iterator[tuple[
 def _count_band(
     objects: NDArray[np.int64],
     channel: NDArray[np.int64],
-    row: NDArray[np.int64],
-    column: NDArray[np.int64],
-    sign: NDArray[np.int64],
+    crossings: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
     n_pairs: int,
+    groups: NDArray[np.int64] | None,
 ) -> NDArray[np.float64]:
     """Return pixel counts (T, F, M, pair detected, pair reference, pair shared) of one band."""
+    row, column, sign = crossings
     # First sweep, object by object: where only d, only r, or both cover.
     (span_row, span_object), begin, end, (of_d, of_r) = _sweep((column, row, objects), channel, sign, channels=2)
     by_d, by_r = of_d > 0, of_r > 0
@@ -133,9 +136,10 @@ def _count_band(
     span_row, span_object, begin, end = span_row[used], span_object[used], begin[used], end[used]
     by_d, by_r = by_d[used], by_r[used]
     kind = np.where(by_d & by_r, 0, np.where(by_d, 1, 2))
-    # Second sweep, all objects together: where candidates of T, F and M cover.
+    # Second sweep, all objects (of a group) together: where candidates of T, F and M cover.
+    slower = [span_row] if groups is None else [span_row, groups[span_object]]
     _, left, right, cover = _sweep(
-        (np.concatenate([begin, end]), np.concatenate([span_row, span_row])),
+        (np.concatenate([begin, end]), *(np.concatenate([key, key]) for key in slower)),
         np.concatenate([kind, kind]),
         np.repeat([1, -1], len(used)),
         channels=3,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -12,12 +14,12 @@ from ..overlay.areas import AreaTally, exact_areas
 from ..overlay.exact_sum import exact_sum
 from ..overlay.left_out import clipped, remeasured
 from ..overlay.outline_distances import PairDistances
-from ..overlay.overlaps import shared_areas
+from ..overlay.overlaps import Overlaps, shared_areas
 from ..overlay.pixels import pixel_areas
 from .object_graph import OverlapGraph
-from .tallies import Buildings, Counts, PairSums
+from .tallies import Buildings, Counts, LiteralAreas, PairSums
 
-__all__ = ["count_buildings", "count_objects", "measure_areas", "pair_sums"]
+__all__ = ["count_buildings", "count_objects", "measure_areas", "natural_overlaps", "pair_sums"]
 
 
 def count_objects(graph: OverlapGraph) -> Counts:
@@ -29,9 +31,7 @@ def count_objects(graph: OverlapGraph) -> Counts:
 
     both = graph.detections.mask[within.first] & graph.detections.mask[within.second]
     one, two = within.first[both], within.second[both]
-    # Natural overlap: two true positives on two parts of one building (a reference has one partner, so parts differ).
-    natural = matched[one] & matched[two]
-    natural[natural] = building[partner[one[natural]]] == building[partner[two[natural]]]
+    natural = _natural(graph, one, two)
     overlapping = np.union1d(one[~natural], two[~natural])
 
     buildings = int(building.max()) + 1 if len(building) else 1
@@ -57,6 +57,27 @@ def count_objects(graph: OverlapGraph) -> Counts:
     )
 
 
+def _natural(graph: OverlapGraph, one: NDArray[np.int64], two: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which pairs of detections are true positives on two parts of one building.
+
+    A reference has one partner, so the parts differ.
+    """
+    partner, building = graph.correspondence.of_detection, graph.reference.building_codes
+    natural = (partner[one] >= 0) & (partner[two] >= 0)
+    natural[natural] = building[partner[one[natural]]] == building[partner[two[natural]]]
+    return natural
+
+
+def natural_overlaps(graph: OverlapGraph, within: tuple[Overlaps, Overlaps]) -> tuple[Overlaps, Overlaps]:
+    """Return the overlaps of parts of one building: between detections, and between references."""
+    building = graph.reference.building_codes
+    found, known = within
+    return (
+        found.where(_natural(graph, found.first, found.second)),
+        known.where(building[known.first] == building[known.second]),
+    )
+
+
 def count_buildings(graph: OverlapGraph) -> Buildings:
     """Return how many reference buildings there are, and how many have all or any of their parts found."""
     counted = graph.references.mask
@@ -78,8 +99,10 @@ def measure_areas(
     *,
     area: shapely.Geometry | None,
     lattice: Grid | None,
-) -> AreaTally:
-    """Return T, F and M, clipped to the evaluation area.
+) -> tuple[AreaTally, LiteralAreas]:
+    """Return T, F and M, clipped to the evaluation area: of the unions, and by the literal text of section 4.2.2.
+
+    By the literal text each entity counts for itself, and only what parts of one building share counts once.
 
     Parameters
     ----------
@@ -101,23 +124,23 @@ def measure_areas(
         shared = shared_areas(detected, reference, *pairs)
         within = remeasured(detected, within[0]), remeasured(reference, within[1])
     if lattice is not None:
-        return pixel_areas(
-            detected.polygons,
-            reference.polygons,
-            pairs,
-            lattice,
+        building = graph.reference.building_codes
+        alone = len(building) + np.arange(len(false_positives))
+        buildings = np.concatenate([building[pairs[1]], alone, building[false_negatives]])
+        by_pixels = partial(
+            pixel_areas,
+            *(detected.polygons, reference.polygons, pairs, lattice),
             false_positives=false_positives,
             false_negatives=false_negatives,
         )
-    return exact_areas(
-        detected,
-        reference,
-        pairs,
-        shared,
+        return by_pixels(), LiteralAreas.of(by_pixels(groups=buildings))
+    exact = partial(
+        exact_areas,
+        *(detected, reference, pairs, shared),
         false_positives=false_positives,
         false_negatives=false_negatives,
-        within=within,
     )
+    return exact(within=within), LiteralAreas.of(exact(within=natural_overlaps(graph, within)))
 
 
 def pair_sums(graph: OverlapGraph, outlines: PairDistances, gsd: float | None) -> PairSums:

@@ -31,6 +31,7 @@ from .indices import (
     MultipleAsCorrectIndices,
     ObjectIndices,
     PixelIndices,
+    PixelLiteralIndices,
 )
 from .object_graph import ObjectGraph, OverlapGraph, object_graph
 from .tallies import Counts, Scenes, ThresholdFreeTallies
@@ -72,6 +73,11 @@ class ThresholdFreeEvaluation(Evaluation):
         return PixelIndices.of(self.tallies)
 
     @cached_property
+    def pixel_literal(self) -> PixelLiteralIndices:
+        """The seven pixel (area) indices by the literal text of the paper: entity by entity."""
+        return PixelLiteralIndices.of(self.tallies)
+
+    @cached_property
     def geometric(self) -> GeometricIndices:
         """RMSE and its companions."""
         return GeometricIndices.of(self.tallies)
@@ -95,7 +101,7 @@ class ThresholdFreeEvaluation(Evaluation):
             "pairs": tallies.geometric.pairs,
             "pairs_by_corners": tallies.geometric.pairs_by_corners,
         }
-        for name in ("areas", "left_out", "buildings"):
+        for name in ("areas", "literal_areas", "left_out", "buildings"):
             content[name] = getattr(tallies, name).to_dict()
         return content
 
@@ -160,12 +166,14 @@ class ThresholdFree(Evaluator):
             shapely.prepare(area)
         graph = object_graph(detected, reference, matching=self.matching, area=area, minimum_area=self.minimum_area)
         outlines = pair_distances(detected, reference, graph.correspondence.pairs)
+        areas, literal = measure_areas(graph, detected, reference, area=area, lattice=lattice if by_pixels else None)
         tallies = ThresholdFreeTallies(
             counts=count_objects(graph),
             buildings=count_buildings(graph),
             scenes=Scenes(all=1, by_pixels=int(by_pixels)),
             left_out=LeftOut.of(graph.detections, graph.references),
-            areas=measure_areas(graph, detected, reference, area=area, lattice=lattice if by_pixels else None),
+            areas=areas,
+            literal_areas=literal,
             geometric=pair_sums(graph, outlines, lattice.gsd if lattice else None),
             iou=ThresholdFreeTallies().iou.filled(graph.pair_iou),
         )

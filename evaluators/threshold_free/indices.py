@@ -20,6 +20,7 @@ __all__ = [
     "MultipleAsCorrectIndices",
     "ObjectIndices",
     "PixelIndices",
+    "PixelLiteralIndices",
 ]
 
 _PAPER = "Awrangjeb, Ravanbakhsh & Fraser 2010"
@@ -209,6 +210,81 @@ class PixelIndices(IndexGroup):
     )
 
 
+_LITERAL = f"{_PAPER}, 4.2.2 (literal text)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixelLiteralIndices(IndexGroup):
+    """The seven pixel (area) indices by the literal text: T, F and M summed entity by entity; None where undefined.
+
+    "The rest" of each true positive counts as false although another entity covers it correctly; only what parts of
+    one building share counts once.
+    """
+
+    key = "pixel_literal"
+    title = "area, literal"
+
+    completeness: float | None = _variant(
+        "pixel completeness, literal",
+        "higher",
+        "fraction",
+        lambda t: ratio(t.literal_areas.true_positive, t.literal_areas.true_positive + t.literal_areas.false_negative),
+        meaning="T/(T+M), entity by entity",
+        source=_LITERAL,
+    )
+    correctness: float | None = _variant(
+        "pixel correctness, literal",
+        "higher",
+        "fraction",
+        lambda t: ratio(t.literal_areas.true_positive, t.literal_areas.true_positive + t.literal_areas.false_positive),
+        meaning="T/(T+F), entity by entity",
+        source=_LITERAL,
+    )
+    quality: float | None = _variant(
+        "pixel quality, literal",
+        "higher",
+        "fraction",
+        lambda t: ratio(
+            t.literal_areas.true_positive,
+            t.literal_areas.true_positive + t.literal_areas.false_positive + t.literal_areas.false_negative,
+        ),
+        meaning="T/(T+F+M), entity by entity",
+        source=_LITERAL,
+    )
+    area_omission_error: float | None = _variant(
+        "area omission error, literal",
+        "lower",
+        "fraction",
+        lambda t: ratio(t.literal_areas.false_negative, t.literal_areas.true_positive + t.literal_areas.false_negative),
+        meaning="M/(T+M), entity by entity",
+        source=_LITERAL,
+    )
+    area_commission_error: float | None = _variant(
+        "area commission error, literal",
+        "lower",
+        "fraction",
+        lambda t: ratio(t.literal_areas.false_positive, t.literal_areas.true_positive + t.literal_areas.false_positive),
+        meaning="F/(T+F), entity by entity",
+        source=_LITERAL,
+    )
+    branching_factor: float | None = _variant(
+        "branching factor, literal",
+        "lower",
+        "ratio",
+        lambda t: ratio(t.literal_areas.false_positive, t.literal_areas.true_positive),
+        meaning="F/T, entity by entity",
+        source=_LITERAL,
+    )
+    miss_factor: float | None = _variant(
+        "miss factor, literal",
+        "lower",
+        "ratio",
+        lambda t: ratio(t.literal_areas.false_negative, t.literal_areas.true_positive),
+        meaning="M/T, entity by entity",
+        source=_LITERAL,
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class GeometricIndices(IndexGroup):
     """RMSE and its companions, over TP pairs; None where there is no pair."""
@@ -330,4 +406,11 @@ class BuildingIndices(IndexGroup):
 
 
 #: In the order of tables.
-GROUPS = (ObjectIndices, PixelIndices, GeometricIndices, MultipleAsCorrectIndices, BuildingIndices)
+GROUPS = (
+    ObjectIndices,
+    PixelIndices,
+    GeometricIndices,
+    PixelLiteralIndices,
+    MultipleAsCorrectIndices,
+    BuildingIndices,
+)

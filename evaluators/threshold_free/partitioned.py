@@ -20,10 +20,10 @@ from ..overlay.outline_distances import PairDistances
 from ..overlay.outline_store import OutlineStore
 from ..overlay.partition import united_from_stores, whole_graph
 from ..verdict_table import VerdictTable
-from .counting import count_buildings, count_objects, pair_sums
+from .counting import count_buildings, count_objects, natural_overlaps, pair_sums
 from .evaluator import ThresholdFree, ThresholdFreeEvaluation
 from .object_graph import overlap_graph
-from .tallies import Scenes, ThresholdFreeTallies
+from .tallies import LiteralAreas, Scenes, ThresholdFreeTallies
 from .verdicts import find_verdicts
 
 __all__ = ["evaluate_stores"]
@@ -80,13 +80,13 @@ def evaluate_stores(
     outlines = PairDistances(table.outline[place], by_corners, table.polis[place])
     del table
     match = graph.correspondence
-    areas = tally_areas(
+    exact = partial(
+        tally_areas,
         (sides[0].areas, sides[1].areas),
         pairs,
         graph.overlaps.area[graph.matched_overlaps],
         false_positives=np.flatnonzero(graph.detections.mask & (match.booked_on < 0)),
         false_negatives=np.flatnonzero(graph.references.mask & (match.of_reference < 0)),
-        within=within,
         united=partial(united_from_stores, detected, reference),
     )
     tallies = ThresholdFreeTallies(
@@ -94,7 +94,8 @@ def evaluate_stores(
         buildings=count_buildings(graph),
         scenes=Scenes(all=1, by_pixels=0),
         left_out=LeftOut.of(graph.detections, graph.references),
-        areas=areas,
+        areas=exact(within=within),
+        literal_areas=LiteralAreas.of(exact(within=natural_overlaps(graph, within))),
         geometric=pair_sums(graph, outlines, None),
         iou=ThresholdFreeTallies().iou.filled(graph.pair_iou),
     )

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from ..overlay.areas import AreaTally
 from ..overlay.left_out import LeftOut
-from ..tally import Histogram, Tallies, histogram
+from ..tally import ADDED, Histogram, Tallies, histogram
 
-__all__ = ["Buildings", "Counts", "PairSums", "Scenes", "ThresholdFreeTallies"]
+__all__ = ["Buildings", "Counts", "LiteralAreas", "PairSums", "Scenes", "ThresholdFreeTallies"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +54,24 @@ class Scenes(Tallies):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LiteralAreas(Tallies):
+    """T, F and M by the literal text of section 4.2.2, m2: each entity for itself, parts of one building once."""
+
+    true_positive: float = 0.0
+    false_positive: float = 0.0
+    false_negative: float = 0.0
+
+    @classmethod
+    def of(cls, areas: AreaTally) -> LiteralAreas:
+        """Return T, F and M of a tally."""
+        return cls(
+            true_positive=areas.true_positive,
+            false_positive=areas.false_positive,
+            false_negative=areas.false_negative,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class PairSums(Tallies):
     """Sums over the TP pairs.
 
@@ -88,5 +106,6 @@ class ThresholdFreeTallies(Tallies):
     scenes: Scenes = field(default_factory=Scenes)
     left_out: LeftOut = field(default_factory=LeftOut)
     areas: AreaTally = field(default_factory=AreaTally)
+    literal_areas: LiteralAreas = field(default_factory=LiteralAreas, metadata=ADDED)
     geometric: PairSums = field(default_factory=PairSums)
     iou: Histogram = field(default_factory=histogram(low=0.0, high=1.0, bins=1000))

@@ -109,11 +109,32 @@ def evaluate(detected, reference, building=None, *, matching="nearest", area=Non
         "areas.true_positive": true.area,
         "areas.false_positive": shapely.union_all(commission).difference(true).area,
         "areas.false_negative": shapely.union_all(omission).difference(true).area,
+        **literal_areas(
+            matches, building, lambda d: clip(detected[d]), lambda r: clip(reference[r]), false_positive, false_negative
+        ),
         "areas.pair_detected": sum(one.area for one, _ in pairs),
         "areas.pair_reference": sum(two.area for _, two in pairs),
         "areas.pair_shared": sum(one.intersection(two).area for one, two in pairs),
         "geometric.sum_squared": sum(outline_distance(detected[d], reference[r]) ** 2 for d, r in matches.items()),
         "geometric.sum_polis": sum(polis(detected[d], reference[r]) for d, r in matches.items()),
+    }
+
+
+def literal_areas(matches, building, one_of, two_of, false_positive, false_negative):
+    """Return T, F and M entity by entity, what parts of one building share once."""
+    true = omission = 0.0
+    commission = sum(one_of(d).area for d in false_positive)
+    for label in dict.fromkeys(building):
+        own = [(one_of(d), two_of(r)) for d, r in matches.items() if building[r] == label]
+        missed = [two_of(r) for r in false_negative if building[r] == label]
+        found = shapely.union_all([one.intersection(two) for one, two in own])
+        true += found.area
+        commission += shapely.union_all([one for one, _ in own]).difference(found).area
+        omission += shapely.union_all([*(two for _, two in own), *missed]).difference(found).area
+    return {
+        "literal_areas.true_positive": true,
+        "literal_areas.false_positive": commission,
+        "literal_areas.false_negative": omission,
     }
 
 

@@ -244,3 +244,34 @@ def test_errors_of_pairs_are_never_negative_where_the_detection_covers_its_refer
     evaluation = evaluate([circle(90 * factor)], [circle(90)])
     assert 0 <= evaluation.pixel.area_omission_error_matched < 1e-9
     assert evaluation.pixel.area_commission_error_matched >= 0
+
+
+@laws
+@given(seeds)
+def test_the_literal_areas_are_never_smaller_than_the_unions(seed):
+    detected, reference, building = scene(seed)
+    tallies = evaluate(detected, reference, building).tallies
+    for key in ("true_positive", "false_positive", "false_negative"):
+        assert getattr(tallies.literal_areas, key) >= getattr(tallies.areas, key) - 1e-6
+
+
+def test_literal_areas_of_a_house_in_its_neighbour_worked_by_hand():
+    # Two buildings side by side; the detection of the left one reaches 2 m over the right one, which is found, too.
+    reference = [shapely.box(0, 0, 10, 10), shapely.box(10, 0, 20, 10)]
+    detected = [shapely.box(0, 0, 12, 10), shapely.box(10, 0, 20, 10)]
+    found = evaluate(detected, reference)
+    assert (found.pixel.correctness, found.pixel.quality) == (1, 1), "covered correctly by the other detection"
+    assert found.pixel_literal.correctness == pytest.approx(200 / 220), "the rest of the first are FP pixels"
+    assert found.pixel_literal.completeness == 1
+    same = evaluate(detected, reference, [7, 7])
+    assert same.pixel_literal.quality == 1, "natural overlap counts once"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_literal_areas_in_pixels_tend_to_the_exact_ones(seed):
+    detected, reference, building = scene(seed)
+    exact = evaluate(detected, reference, building).tallies
+    counted = evaluate(detected, reference, building, area="pixels", gsd=0.05).tallies
+    for key in ("true_positive", "false_positive", "false_negative"):
+        one, two = (getattr(tallies.literal_areas, key) for tallies in (exact, counted))
+        assert two == pytest.approx(one, rel=0.02, abs=1.0)
