@@ -24,6 +24,9 @@ from .package import NAME
 
 __all__ = ["Registry", "nearest_hint", "parse_assignment", "parse_selection", "split_list"]
 
+#: Folders of plugins that were named by their file.
+_plugin_folders: set[str] = set()
+
 _SELECTION = re.compile(r"^(?P<name>[^\[\]]+?)(?:\[(?P<parameters>.*)\])?$", re.DOTALL)
 #: Commas that are followed by an even number of double quotes.
 _OUTSIDE_QUOTES = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')
@@ -177,12 +180,16 @@ def _origin(plugin: type[Any]) -> tuple[str, str]:
 
 
 def _load_file(path: Path, kind: str) -> ModuleType:
-    """Import a Python file the user names; its module name holds its full path so that two files never mix."""
+    """Import a Python file the user names; its module name holds its full path so that two files never mix.
+
+    As for a script, the files beside it can be imported.
+    """
     if not path.is_file():
         raise InputError(f"{path}: no such file; name the Python file that holds the {kind}")
     name = "roofbench_plugin_" + re.sub(r"\W", "_", str(path.resolve()))
     if name in sys.modules:
         return sys.modules[name]
+    _find_files_beside(path.resolve())
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
@@ -197,6 +204,24 @@ def _load_file(path: Path, kind: str) -> ModuleType:
         del sys.modules[name]
         raise InputError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
     return module
+
+
+def _find_files_beside(path: Path) -> None:
+    """Put the folder of a plugin on the module path; refuse it where a file beside it has a name that is taken.
+
+    The file of another plugin would be imported in its place, and two versions of a detector would be one.
+    """
+    folder = path.parent
+    for file in folder.glob("*.py"):
+        loaded = getattr(sys.modules.get(file.stem), "__file__", None)
+        if loaded and file != path and str(Path(loaded).parent) in _plugin_folders - {str(folder)}:
+            raise InputError(
+                f"{file} and {loaded} have one name, and a plugin beside each is used: rename one of them, or use one "
+                "plugin at a time"
+            )
+    _plugin_folders.add(str(folder))
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
 
 
 def _never_load_stale_kernels() -> None:

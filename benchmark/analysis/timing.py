@@ -86,7 +86,7 @@ def time_side_by_side(
                 for label in changed:
                     sides = {old: recipes[label], new: candidate.detectors[label].recipe}
                     seed = baseline.detectors[label].seeds[0]
-                    ratios = _log_ratios(list(baseline.scenes.values()), sides, seed, repeats)
+                    ratios = _log_ratios(label, list(baseline.scenes.values()), sides, seed, repeats)
                     conclusions.append(_conclusion(label, ratios, margin, level))
                 return conclusions
             finally:
@@ -172,14 +172,24 @@ def _unpacked(commit: str | None) -> Iterator[Path]:
 
 
 def _log_ratios(
-    scenes: Sequence[BaselineScene], sides: Mapping[IsolatedProcess, PluginRecipe], seed: int, repeats: int
+    label: str,
+    scenes: Sequence[BaselineScene],
+    sides: Mapping[IsolatedProcess, PluginRecipe],
+    seed: int,
+    repeats: int,
 ) -> list[float]:
     """Return the logarithm of new by old processor time of every scene on which both sides ran.
 
     `sides` are the old and the new process, in this order, each with its recipe of the detector.
+
+    Raises
+    ------
+    UnsupportedError
+        A side fails on every scene.
     """
     old, new = sides
-    ratios = []
+    ratios: list[float] = []
+    failures: dict[str, str] = {}
     for number, scene in enumerate(scenes):
         tasks = {
             side: Task(scene=scene.recipe, detector=recipe, seed=seed, evaluators=()).to_json()
@@ -194,8 +204,15 @@ def _log_ratios(
             outcome = Outcome.from_bytes(side.call(tasks[side], Limits()))
             if outcome.status == "ok":
                 seconds[side].append(outcome.cost.cpu_seconds)
+            else:
+                failures.setdefault("the code of the baseline" if side is old else "the new code", outcome.reason)
         if seconds[old] and seconds[new] and min(seconds[old]) > 0 and min(seconds[new]) > 0:
             ratios.append(math.log(min(seconds[new]) / min(seconds[old])))
+    if failures and not ratios:
+        reasons = "; ".join(f"{side}: {reason}" for side, reason in failures.items())
+        raise UnsupportedError(
+            f"the run time of {label} cannot be compared, since no scene ran on both sides: {reasons}"
+        )
     return ratios
 
 
