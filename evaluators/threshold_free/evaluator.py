@@ -21,6 +21,7 @@ from ...scenes.geodata.raster import Grid
 from ..base import Evaluation, Evaluator
 from ..overlay.left_out import LeftOut, left_out_notes, repair_notes
 from ..overlay.outline_distances import PairDistances, pair_distances
+from ..overlay.reference_overlaps import reference_overlap_notes
 from ..verdict_table import Verdicts
 from .correspondence import MATCHINGS
 from .counting import count_buildings, count_objects, measure_areas, pair_sums
@@ -180,7 +181,11 @@ class ThresholdFree(Evaluator):
         return ThresholdFreeEvaluation(
             evaluator=self,
             tallies=tallies,
-            notes=(*repair_notes(detected, reference), *self.notes_of(tallies)),
+            notes=(
+                *repair_notes(detected, reference),
+                *reference_overlap_notes(reference, graph.within[1]),
+                *self.notes_of(tallies),
+            ),
             find_verdicts=lambda: _verdicts(graph, outlines, detected, reference),
             graph=graph,
         )

@@ -8,6 +8,7 @@ import pytest
 from harness.command_line import roofbench
 
 import roofbench as rb
+from roofbench.benchmark.analysis.published import PublishedRow
 from roofbench.benchmark.analysis.report_contents import fill_report, newest_runs
 from roofbench.benchmark.store.writer import Store
 from roofbench.reports.html_report import html_report
@@ -51,6 +52,31 @@ def test_a_store_of_version_0_1_is_reported_and_its_maps_come_back_by_scoring_it
         new = fill_report(opened, newest_runs(opened), title="new")
     assert new.boards[0].entries[0].cells["object.quality"].value == 22 / 31
     assert new.scenes[0].overlays[0].verdicts.reference_table.count("FN") == 9
+
+
+def test_the_row_by_one_pass_stands_beside_ours_and_the_published(tmp_path, monkeypatch):
+    rb.run(scenes=["moonee-ponds-small"], detectors=["ndsm"], store=tmp_path / "runs.sqlite")
+    row = PublishedRow(
+        detector="ndsm", scene="small", presets=("moonee-ponds-small",), source="2010", printed={"Q_l": "91.0"}
+    )
+    monkeypatch.setattr("roofbench.benchmark.analysis.report_contents.PUBLISHED", (row,))
+    with Store(tmp_path / "runs.sqlite") as opened:
+        rows = newest_runs(opened, detector="ndsm")
+        filled = fill_report(opened, rows, title="published")
+        one_pass = [
+            rb.evaluate(
+                opened.detections(run.id),
+                (scene := opened.scene(run.scene_id)).reference,
+                grid=scene.grid,
+                matching="one-pass",
+            ).object.quality
+            for run in rows
+        ]
+    ((_, ours),) = filled.comparison.rows
+    assert ours.one_pass["object.quality"] == pytest.approx(sum(one_pass) / len(one_pass))
+    page = html_report(filled)
+    assert "ours, 1 scene, one-pass" in page
+    assert "91.0" in page
 
 
 def test_counts_by_size_are_those_of_the_leaderboard(filled):
