@@ -124,7 +124,7 @@ class Table:
         return [_width([*column.lines, *texts]) for column, texts in zip(self.columns, cells, strict=True)]
 
     def _cut(self, cells: list[list[str]], fixed: Sequence[int], free: Sequence[int], width: int) -> None:
-        """Shorten left-aligned columns, the widest first, until the fixed ones and any other fit."""
+        """Shorten cells of left-aligned columns in place, the widest first, until the fixed ones and any other fit."""
         widths = self._widths(cells)
         others = max((widths[place] for place in free), default=0)
         long = sorted((p for p, c in enumerate(self.columns) if c.align == "left"), key=lambda place: -widths[place])

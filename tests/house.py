@@ -337,6 +337,38 @@ def _is_kernel(decorator: ast.expr) -> bool:
     return ast.unparse(made).split(".")[-1] == "kernel"
 
 
+#: Words by which the docstring of a kernel says that it writes into an argument.
+_CHANGES = re.compile(
+    r"\b(in place|fill(s|ed)?|writes?|written|overwrit\w+|append(s|ed)?|advance[sd]?)\b", re.IGNORECASE
+)
+
+
+def kernels_say_what_they_change(house: House) -> set[str]:
+    """Kernels that write into an argument say so in their docstring: fill, append, write, in place."""
+    found = set()
+    for module in house.modules.values():
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.FunctionDef) and any(map(_is_kernel, node.decorator_list)):
+                given = {argument.arg for argument in node.args.args}
+                if given & _written(node) and not _CHANGES.search(ast.get_docstring(node) or ""):
+                    found.add(f"{module.name}: {node.name}")
+    return found
+
+
+def _written(function: ast.FunctionDef) -> set[str]:
+    """Return the names whose elements a function sets and that it does not bind itself."""
+    bound, written = set(), set()
+    for node in ast.walk(function):
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        for item in [item for target in targets for item in getattr(target, "elts", [target])]:
+            base = item
+            while isinstance(base, ast.Attribute | ast.Subscript):
+                base = base.value
+            if isinstance(base, ast.Name):
+                (bound if base is item else written).add(base.id)
+    return written - bound
+
+
 Rule = Callable[[House], set[str]]
 RULES: tuple[Rule, ...] = (
     imports_run_downwards,
@@ -352,6 +384,7 @@ RULES: tuple[Rule, ...] = (
     detectors_do_not_draw,
     one_home_for_kernels,
     annotated_kernels,
+    kernels_say_what_they_change,
 )
 
 

@@ -43,6 +43,10 @@ PLANTED = {
     "short_modules": {"core/a.py": "\n" * 451, "core/b.py": "\n" * 450},
     "detectors_do_not_draw": {"detectors/a.py": "def f():\n    from matplotlib.figure import Figure"},
     "one_home_for_kernels": {"core/kernels.py": "from numba import njit", "scenes/a.py": "import numba"},
+    "kernels_say_what_they_change": {
+        "scenes/a.py": "@kernel\ndef silent(x):\n    x[0] = 1",
+        "scenes/b.py": "@kernel\ndef fill(x):\n    'Fill x.'\n    x[0] += 1\ndef plain(x):\n    x[0] = 1",
+    },
     "annotated_kernels": {
         "scenes/a.py": "@kernel\ndef bare(x): ...\n@kernel(inline='always')\ndef half(x: int): ...",
         "scenes/b.py": "@kernel\ndef whole(x: int) -> int: ...\ndef plain(x): ...",
@@ -65,6 +69,7 @@ def test_each_rule_finds_what_breaks_it(rule, tmp_path):
         "names_are_listed_at_home": {"core/a.py -> core/b.py: hidden", "core/a.py -> core/b.py: other"},
         "few_arguments": {"core/a.py: A.f"},
         "one_home_for_kernels": {"scenes/a.py"},
+        "kernels_say_what_they_change": {"scenes/a.py: silent"},
         "annotated_kernels": {"scenes/a.py: bare", "scenes/a.py: half"},
     }.get(rule.__name__, {next(iter(PLANTED[rule.__name__]))})
     assert found == expected

@@ -96,7 +96,7 @@ def make_births(window: Window, boxes: Rectangles, weights: Floats, share: float
 
 @kernel
 def propose_birth(births: Births, state: RandomState, rectangle: Rectangles) -> None:
-    """Draw a rectangle from q; its centre or sides may fall outside what is allowed, where the target is 0."""
+    """Fill a rectangle drawn from q; its centre or sides may be outside what is allowed, where the target is 0."""
     least, largest = births.sides[0], births.sides[1]
     if uniform(state) >= births.share:
         w = births.edges

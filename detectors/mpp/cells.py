@@ -197,7 +197,7 @@ def _above(cloud: _Cloud, i: int) -> int:
 
 @kernel
 def _count(cloud: _Cloud, band: _Band, low: int, counts: Labels) -> None:
-    """Count all points, high ones and parts of multiple returns per cell, and find the top."""
+    """Fill the numbers of points, of high ones and of parts of multiple returns per cell, and the top."""
     for i in range(len(cloud.x)):
         k = _cell_of(cloud.x[i], cloud.y[i], band)
         if k < 0:

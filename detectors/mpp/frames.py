@@ -351,7 +351,7 @@ def _lower_one(surface: _Surface, box: Rectangles) -> None:
 
 @kernel
 def _mark_storeys(surface: _Surface, cells: Labels, known: Integers, base: int, storeys: _Storeys) -> None:
-    """Mark the patches that lie inside a box, above its base, and reach its border on one side at most."""
+    """Mark, in place, the patches that lie inside a box, above its base, and reach its border on one side at most."""
     count, least = len(storeys.marked), storeys.least
     inside, rise = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
     reached = np.zeros((count, 4), dtype=np.int64)

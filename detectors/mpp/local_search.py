@@ -83,7 +83,7 @@ def local_search(
 def _add_boxes(
     window: Window, buildings: Buildings, count: int, boxes: Rectangles, alones: Floats
 ) -> tuple[float, int]:
-    """Add the boxes that lower the energy; return the gain and the number of buildings."""
+    """Append the boxes that lower the energy; return the gain and the number of buildings."""
     gained = 0.0
     for j in range(len(boxes)):
         if count >= len(buildings.energies) - 1 or alones[j] >= -LEAST_GAIN:

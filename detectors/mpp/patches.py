@@ -63,7 +63,7 @@ def label_patches(
 def _label_rows(
     height: Heights, mask: Mask | Labels, step: int, first: int, last: int, labels: Labels, parent: Labels
 ) -> tuple[int, int]:
-    """Label the patches of some rows, some with several numbers that `parent` joins; return first row, last number."""
+    """Fill labels of some rows, for some patches several numbers that `parent` joins; return first row, last number."""
     columns = height.shape[1]
     number = first * columns
     for r in range(first, last):
@@ -89,7 +89,7 @@ def _label_rows(
 
 @kernel
 def _unite(parent: Labels, one: int, other: int) -> int:
-    """Join two numbers; return the smallest of what now belongs together."""
+    """Join two numbers in place; return the smallest of what now belongs together."""
     while parent[one] != one:
         parent[one] = parent[parent[one]]
         one = parent[one]
@@ -111,7 +111,7 @@ def _join_rows(height: Heights, labels: Labels, step: int, row: int, parent: Lab
 
 @kernel
 def _renumber(parent: Labels, bands: Integers, columns: int) -> int:
-    """Replace parents by labels; return how many there are."""
+    """Replace parents by labels, in place; return how many there are."""
     count = 0
     for b in range(len(bands)):
         for number in range(bands[b, 0] * columns + 1, bands[b, 1] + 1):
@@ -126,7 +126,7 @@ def _renumber(parent: Labels, bands: Integers, columns: int) -> int:
 
 @kernel
 def _relabel(labels: Labels, parent: Labels, first: int, last: int) -> None:
-    """Replace the numbers of some rows by labels."""
+    """Replace the numbers of some rows by labels, in place."""
     for r in range(first, last):
         for c in range(labels.shape[1]):
             if labels[r, c] > 0:

@@ -74,7 +74,7 @@ def _first_round(height: Heights, state: States, labels: Labels, first: int, las
 
 @kernel
 def _further_rounds(height: Heights, state: States, labels: Labels, assigned: Labels) -> None:
-    """Assign the cells of the first round, then those of the others: changes happen only beside assigned cells."""
+    """Assign cells round by round, in place: after the first round changes happen only beside assigned cells."""
     rows, columns = labels.shape
     for turn in range(_ROUNDS):
         for k in range(len(assigned)):

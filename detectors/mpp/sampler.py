@@ -149,7 +149,7 @@ def _pick_neighbour(rectangles: Rectangles, count: int, i: int, reach: float, nu
 
 @kernel
 def _try_birth(window: Window, births: Births, chain: _Chain, count: int, odds: _Odds) -> tuple[int, float]:
-    """Propose a birth; return the number of buildings afterwards and by how much the energy changed."""
+    """Propose a birth, appended if accepted; return the number of buildings afterwards and the change of energy."""
     new = chain.new
     propose_birth(births, chain.state, new)
     if not allowed(window, new) or count >= len(chain.energies):

@@ -50,7 +50,7 @@ class Buildings(NamedTuple):
 
 @kernel
 def remove(buildings: Buildings, count: int, i: int) -> None:
-    """Remove building i of the first `count`: the last one takes its place."""
+    """Remove building i of the first `count`, in place: it is replaced by the last one."""
     last = count - 1
     buildings.rectangles[i], buildings.energies[i] = buildings.rectangles[last], buildings.energies[last]
     buildings.fresh[i] = buildings.fresh[last]
@@ -202,7 +202,7 @@ def merge_best(window: Window, buildings: Buildings, count: int, i: int) -> tupl
 def replace_by_boxes(
     window: Window, buildings: Buildings, count: int, boxes: Rectangles, alones: Floats
 ) -> tuple[float, int]:
-    """Put boxes in the place of the buildings that they overlap where that lowers the energy; return gain and count.
+    """Replace buildings, in place, by boxes that overlap them where that lowers the energy; return gain and count.
 
     `alones` holds the energy of each box by itself.
     """

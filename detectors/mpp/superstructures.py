@@ -210,7 +210,7 @@ def _lower_to_roof(
 
 @kernel
 def _choose(patches: Labels, chosen: Mask, first: int, last: int, waiting: States) -> None:
-    """Mark for some rows the cells of the chosen patches."""
+    """Mark, in place, for some rows the cells of the chosen patches."""
     for r in range(first, last):
         for c in range(patches.shape[1]):
             waiting[r, c] = _WAITING if chosen[patches[r, c]] else _DONE

@@ -80,7 +80,7 @@ def _describe_windows(height: Heights, state: States, openness: States, first: i
 
 @kernel
 def _choose_windows(windows: Bins, state: States, first: int, last: int, bins: Bins) -> None:
-    """Give each cell of some rows the bin of the smoothest window that holds it."""
+    """Fill for each cell of some rows the bin of the smoothest window that holds it."""
     rows, columns = windows.shape
     for r in range(first, last):
         for c in range(columns):

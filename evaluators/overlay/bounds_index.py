@@ -137,6 +137,7 @@ def _joined(
 def _morton(
     bounds: NDArray[np.float64], low: NDArray[np.float64], size: NDArray[np.float64], keys: NDArray[np.uint64]
 ) -> None:
+    """Fill the Z-order (Morton) key of the centre of each item."""
     for i in range(len(keys)):
         code = np.uint64(0)
         for axis in range(2):

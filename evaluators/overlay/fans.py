@@ -91,6 +91,7 @@ def in_canonical_order(
 
 @kernel
 def _order(outlines: Outlines, first: NDArray[np.int64], second: NDArray[np.int64]) -> None:
+    """Exchange the sides of pairs, in place, so that the smaller outline is the first."""
     for pair in range(len(first)):
         i, j = first[pair], second[pair]
         less = outlines.area[i] - outlines.area[j]
@@ -114,6 +115,7 @@ def _order(outlines: Outlines, first: NDArray[np.int64], second: NDArray[np.int6
 def _fill(
     one: Outlines, two: Outlines, first: NDArray[np.int64], second: NDArray[np.int64], areas: NDArray[np.float64]
 ) -> None:
+    """Fill the shared areas of some pairs."""
     room = 16
     fan = np.empty((room, 6))
     for pair in range(len(first)):

@@ -75,6 +75,7 @@ def polygons_of(outlines: Outlines, rows: NDArray[np.int64]) -> NDArray[np.objec
 def _measure(
     start: NDArray[np.int64], points: NDArray[np.float64], sign: NDArray[np.float64], bounds: NDArray[np.float64]
 ) -> None:
+    """Fill the sign and the bounds of each outline."""
     for i in range(len(sign)):
         low = start[i]
         if low == start[i + 1]:  # empty

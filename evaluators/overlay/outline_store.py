@@ -213,6 +213,7 @@ def _part(x: np.int64, y: np.int64, parts: int) -> np.int64:
 
 @kernel
 def _parts(points: NDArray[np.float64], tile: float, parts: int, found: NDArray[np.int64]) -> None:
+    """Fill the part in which each point lies."""
     for i in range(len(found)):
         x, y = np.int64(np.floor(points[i, 0] / tile)), np.int64(np.floor(points[i, 1] / tile))
         found[i] = _part(x, y, parts)
@@ -255,6 +256,7 @@ def _gather(
     into: NDArray[np.int64],
     gathered: NDArray[np.float64],
 ) -> None:
+    """Fill the vertices of members, in the order of the members."""
     for m in range(len(members)):
         begin = start[members[m]]
         for k in range(into[m + 1] - into[m]):
@@ -269,6 +271,7 @@ def _fetch(
     into: NDArray[np.int64],
     fetched: NDArray[np.float64],
 ) -> None:
+    """Fill the vertices of members at their places among all."""
     for m in range(len(members)):
         begin, place = offset[m], members[m]
         for k in range(into[place + 1] - into[place]):

@@ -71,6 +71,7 @@ def united_areas(one: Outlines, two: Outlines, members: Members, *, threads: int
 
 @kernel
 def _fill(one: Outlines, two: Outlines, members: Members, begin: int, areas: NDArray[np.float64]) -> None:
+    """Fill the areas of some groups."""
     for place in range(len(areas)):
         low, high = members.start[begin + place], members.start[begin + place + 1]
         most = 0
@@ -107,6 +108,7 @@ def _gather(
     edges: NDArray[np.float64],
     count: int,
 ) -> int:
+    """Append the edges of an outline; return how many edges there are now."""
     for k in range(begin, end - 1):
         ax, ay = points[k, 0] - x, points[k, 1] - y
         bx, by = points[k + 1, 0] - x, points[k + 1, 1] - y

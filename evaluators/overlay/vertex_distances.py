@@ -96,6 +96,7 @@ def _align(
     distances: NDArray[np.float64],
 ) -> None:
     # Corners of two convex quadrilaterals in four alignments; `ways` is -1 where one runs against the other.
+    """Fill the corner distances of some pairs."""
     for pair in range(len(first)):
         begin, low = one[0][first[pair]], two[0][second[pair]]
         ways = 1
@@ -124,6 +125,7 @@ def _fill(
     second: NDArray[np.int64],
     distances: NDArray[np.float64],
 ) -> None:
+    """Fill the distances of some pairs."""
     for pair in range(len(first)):
         i, j = first[pair], second[pair]
         there = _mean_distance(one[1], one[0][i], one[0][i + 1], two[1], two[0][j], two[0][j + 1])

@@ -82,7 +82,7 @@ def spacing_of_counts(counts: NDArray[np.int64], square: float, statistic: Stati
 
 @kernel
 def _count(x: _Coordinates, y: _Coordinates, frame: Frame, counts: NDArray[np.int64]) -> None:
-    """Add the points to the counts of their squares, shape (rows, columns)."""
+    """Add the points to the counts of their squares, shape (rows, columns), in place."""
     for i in range(len(x)):
         column, row = (x[i] - frame.west) / frame.gsd, (frame.north - y[i]) / frame.gsd
         if 0 <= column < frame.columns and 0 <= row < frame.rows:

@@ -67,7 +67,7 @@ def _cell_of(x: float, y: float, frame: Frame) -> int:
 
 @kernel
 def _count(x: _Coordinates, y: _Coordinates, frame: Frame, counts: NDArray[np.int64]) -> None:
-    """Count the points of each cell, in the place after its own."""
+    """Fill the counts of the points of each cell, in the place after its own."""
     for i in range(len(x)):
         k = _cell_of(x[i], y[i], frame)
         if k >= 0:
@@ -173,7 +173,7 @@ def _add_near(
     count: NDArray[np.int32],
     total: NDArray[np.float64],
 ) -> None:
-    """Add the points near a surface, `above` it in metres, to the number and the sum of their cells."""
+    """Add the points near a surface, `above` it in metres, to number and sum of their cells, in place."""
     for i in range(len(x)):
         k = _cell_of(x[i], y[i], frame)
         if k >= 0 and abs(above[i]) < tolerance:

@@ -113,10 +113,9 @@ def _extent_of_rasters(headers: Sequence[RasterHeader], crs: str, what: str) -> 
 def _decide_extent(wanted: Extent | None, parts: list[tuple[str, Extent]], log: ImportLog) -> Extent:
     """Return what all parts and the extent that was asked for have in common."""
     layers = len(parts)
-    if wanted is not None:
-        parts.append(("the extent asked for", wanted))
-    where, extent = parts[0]
-    for other, bounds in parts[1:]:
+    named = parts if wanted is None else [*parts, ("the extent asked for", wanted)]
+    where, extent = named[0]
+    for other, bounds in named[1:]:
         common = common_extent(extent, bounds)
         if common is None:
             raise InputError(

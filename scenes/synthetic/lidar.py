@@ -266,7 +266,7 @@ def _solid_top(ray: _Ray, cells: CellLists, planes: NDArray[np.float64]) -> tupl
 def _leaf_hits(
     ray: _Ray, floor: float, cells: CellLists, blobs: NDArray[np.float64], found: NDArray[np.float64]
 ) -> int:
-    """Collect the paths through blobs above `floor` (heights above ground: entry, exit, blob); return how many."""
+    """Fill the paths through blobs above `floor` (heights above ground: entry, exit, blob); return how many."""
     x, y, ground, tx, ty = ray
     start, items, top, highest, size_x, size_y = cells
     count, height, previous = 0, 0.0, -1
@@ -380,7 +380,7 @@ def _scan_chunk(
 
 @kernel
 def _put(echo: NDArray[np.float64], e: int, level: float, reflectance: float, asprs: float) -> None:
-    """Set one echo: height above ground, reflectance, ASPRS class."""
+    """Fill one echo: height above ground, reflectance, ASPRS class."""
     echo[e, 0], echo[e, 1], echo[e, 2] = level, reflectance, asprs
 
 
@@ -432,7 +432,7 @@ def _edge_echo(
     key: np.uint64,
     counter: int,
 ) -> int:
-    """Add the return of the other part of the footprint where an edge runs through it."""
+    """Append to `echo` the return of the other part of the footprint where an edge runs through it."""
     if echoes != 1:
         return echoes
     aside_x, aside_y = _FOOTPRINT * gauss(key, counter + 20), _FOOTPRINT * gauss(key, counter + 21)

@@ -58,7 +58,7 @@ def sunlit(surface: Surface, recipe: SceneParameters) -> NDArray[np.bool_]:
 
 @kernel
 def _sweep(z: NDArray[np.float32], lit: NDArray[np.bool_], downwards: bool, slant: float, drop: float) -> None:
-    """Walk rows in the direction of the shadows; each slanted line keeps the present height of its shadow."""
+    """Fill `lit` row by row along the shadows; each slanted line keeps the present height of its shadow."""
     rows, columns = z.shape
     base = int(abs(slant) * rows) + 2
     front = np.full(columns + 2 * base, -1e9)
@@ -213,7 +213,7 @@ def _ground_albedo(
     patchy: float,
     cover: _Cover,
 ) -> float:
-    """Set the colour of the ground; return its share of direct light."""
+    """Fill the colour of the ground; return its share of direct light."""
     if code >= 64:
         dry = min(max((code - 64) / 63.0 + 0.22 * patchy, 0.0), 1.0)
         factor = 1.0 + 0.07 * grain + 0.05 * patchy
@@ -233,7 +233,7 @@ def _ground_albedo(
 
 @kernel
 def _solid_albedo(albedo: NDArray[np.float64], k: int, face: int, spot: _Spot, roofs: _Roofs) -> float:
-    """Set the colour of a solid's top by its texture; return its share of direct light."""
+    """Fill the colour of a solid's top by its texture; return its share of direct light."""
     x, y, grain, patchy = spot
     _, rectangle, texture, body, colour = roofs
     look = texture[k]
@@ -270,7 +270,7 @@ def _solid_albedo(albedo: NDArray[np.float64], k: int, face: int, spot: _Spot, r
 def _leaf_albedo(
     albedo: NDArray[np.float64], k: int, z: float, spot: _Spot, sun: NDArray[np.float64], crowns: _Crowns
 ) -> float:
-    """Set the colour of a crown; return its share of direct light, by the blob's normal and its leaves."""
+    """Fill the colour of a crown; return its share of direct light, by the blob's normal and its leaves."""
     x, y, grain, patchy = spot
     blobs, tree, colour, size = crowns
     t = tree[k]

@@ -164,7 +164,7 @@ def _lean(
     shift: tuple[float, float],
     walls: _Walls,
 ) -> None:
-    """Follow, for every image cell, the ray from its place on the bare earth to the camera: the last hit is seen."""
+    """Fill every image cell with the last hit of the ray from its place on the bare earth to the camera."""
     colours, z, label, frame = view
     west, north, gsd, _, _ = frame
     bands, rows, columns = out.shape
@@ -221,7 +221,7 @@ def _lean(
 
 @kernel
 def _wall(out: NDArray[np.uint8], k: int, level: float, ray: _Ray, walls: _Walls) -> None:
-    """Colour a cell that shows a wall: it looks towards the camera; floors are bands of windows."""
+    """Fill a cell that shows a wall: it looks towards the camera; floors are bands of windows."""
     x, y, tx, ty = ray
     wall, base, sun, ambient, haze = walls
     towards = (tx * sun[0] + ty * sun[1]) / math.sqrt(tx * tx + ty * ty)
@@ -271,13 +271,13 @@ def _expose(values: NDArray[np.uint8], spread: NDArray[np.float32], noise: float
 
 @kernel
 def _weighted(out: NDArray[np.float32], values: NDArray[np.float32], weight: float) -> None:
-    """Set a line to weighted values."""
+    """Fill a line with weighted values."""
     for c in range(len(out)):
         out[c] = weight * values[c]
 
 
 @kernel
 def _add_pair(out: NDArray[np.float32], before: NDArray[np.float32], after: NDArray[np.float32], weight: float) -> None:
-    """Add the weighted sum of two lines."""
+    """Add the weighted sum of two lines to `out`, in place."""
     for c in range(len(out)):
         out[c] += weight * (before[c] + after[c])

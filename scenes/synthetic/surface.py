@@ -70,6 +70,7 @@ def _raise_solids(
     body: NDArray[np.uint8],
     tile: NDArray[np.float32],
 ) -> None:
+    """Write the tops of solids into the surface, in place, where they are the highest."""
     west, north, gsd, _, _ = frame
     mask = tile.shape[0] - 1
     for k in range(len(rectangle)):
@@ -107,6 +108,7 @@ def _raise_blobs(
     blobs: NDArray[np.float64],
     tile: NDArray[np.float32],
 ) -> None:
+    """Write the blobs of crowns into the surface, in place, where they are the highest."""
     west, north, gsd, _, _ = frame
     mask = tile.shape[0] - 1
     for k in range(len(blobs)):
