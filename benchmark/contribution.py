@@ -23,7 +23,7 @@ __all__ = ["blind_scenes", "contribution_problems", "contribution_suite"]
 
 
 def blind_scenes(suite: Suite, folder: Path, *, overwrite: bool = False) -> Iterator[tuple[Path, Scene]]:
-    """Write the scenes of a suite without what is true of them, and yield each folder with its scene.
+    """Write the scenes of a suite without their ground truth, and yield each folder with its scene.
 
     Raises
     ------

@@ -35,7 +35,7 @@ def is_large(paths: tuple[str, str]) -> bool:
     try:
         return max(open_stream(path).count for path in paths) >= _MANY
     except RoofbenchError:
-        return False  # what is wrong with the file is said where it is read
+        return False  # problems of the file are reported where it is read
 
 
 def evaluate_in_parts(
@@ -51,8 +51,8 @@ def evaluate_in_parts(
 ) -> Evaluation:
     """Compare two files in parts, and write the verdicts.
 
-    The work folder lies beside the file of the verdicts (else among temporary files). An interrupted evaluation leaves
-    it behind and goes on from it; it is removed at the end.
+    The work folder lies beside the file of the verdicts (else among temporary files). An interrupted evaluation keeps
+    it and continues from it; it is removed at the end.
     """
     from ..core.errors import InputError, UnsupportedError
     from ..evaluators.threshold_free.evaluator import ThresholdFree

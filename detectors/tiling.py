@@ -12,8 +12,8 @@ owner
 cut
     A footprint that reaches the rim of a tile's halo inside the scene: the tile may not see all of it.
 seam pass
-    What follows the last tile: of footprints that two tiles found (IoU above 0.5) one stays; what was cut gives way to
-    the whole of it, or is joined with the cut parts of other tiles.
+    What follows the last tile: of footprints that two tiles found (IoU above 0.5) one stays; a cut one is replaced by
+    the whole one, or joined with the cut parts of other tiles.
 
 A tile depends on the scene and on its column and row, never on another tile, so that the result is independent of the
 order of the tiles and of the number of workers.
@@ -43,7 +43,8 @@ __all__ = ["CUT", "Measured", "Seams", "Tile", "join_tiles", "measure", "owned",
 
 #: Attribute of the footprints of a tile that says which are cut; `join_tiles` removes it.
 CUT = "cut_by_tile"
-#: Footprints of different tiles with more than this IoU are one; cut ones give way to so much of their area.
+#: Footprints of different tiles with more than this IoU are one; a cut one is replaced where another covers so much of
+#: it.
 _SAME, _COVERED = 0.5, 0.5
 #: Metres from the rim of the halo within which a footprint counts as cut.
 _RIM = 1.0
@@ -132,8 +133,8 @@ def stream_of(seed: int, tile: Tile, detector: Detector) -> np.random.Generator:
 def measure(scene: Scene, detector: Detector, tiles: Sequence[Tile]) -> Measured:
     """Return what a detector would measure (`Detector.measured`): the lower median over up to five tiles.
 
-    Only the middle of each tile is read. Tiles without points are passed over; tiles that cannot be read, too, since
-    they are reported when their turn comes.
+    Only the middle of each tile is read. Tiles without points and tiles that cannot be read are skipped; the latter are
+    reported when they are processed.
     """
     found: dict[str, list[float]] = defaultdict(list)
     cells: list[float] = []

@@ -1,4 +1,4 @@
-"""Whether the number of returns of a pulse says something of roofs and trees on a cloud.
+"""Whether the number of returns of a pulse separates roofs from trees on a cloud.
 
 A roof returns a pulse once. Where most points of smooth high cells are parts of multiple returns, the numbers do not
 describe the surface: some files write two returns for every pulse. Openness is then counted without them (see `cells`).

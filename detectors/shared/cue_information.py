@@ -57,7 +57,7 @@ class CueInformation:
 
 
 def informative_cues(ratings: Mapping[str, _Floats], among: NDArray[np.bool_]) -> CueInformation:
-    """Return which cues separate roofs from trees, in the opinion of the others.
+    """Return which cues separate roofs from trees, each tested by the others.
 
     The cue of the least separation becomes silent first, and the rest is tested again without it. Where the others
     know too few trees or roofs, a cue can only be tested by what it says of roofs: it is silent when it takes most of

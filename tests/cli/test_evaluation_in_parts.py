@@ -25,9 +25,9 @@ def files(tmp_path):
 
 def test_the_command_gives_the_same_and_leaves_no_work_folder(files):
     whole = json.loads(roofbench("evaluate", "d.gpkg", "r.fgb", "-f", "json", folder=files).stdout)
-    told = roofbench("evaluate", "d.gpkg", "r.fgb", "--parts", "4", "-f", "json", "--verdicts", "v.fgb", folder=files)
-    assert json.loads(told.stdout)["counts"] == whole["counts"]
-    assert "by place into 4 parts" in told.stderr
+    answer = roofbench("evaluate", "d.gpkg", "r.fgb", "--parts", "4", "-f", "json", "--verdicts", "v.fgb", folder=files)
+    assert json.loads(answer.stdout)["counts"] == whole["counts"]
+    assert "by place into 4 parts" in answer.stderr
     assert sorted(item.name for item in files.iterdir()) == ["d.gpkg", "r.fgb", "v.fgb"]
     again = roofbench("evaluate", "d.gpkg", "r.fgb", "--parts", "4", "--verdicts", "v.fgb", folder=files, expect=2)
     assert "v.fgb exists already" in again.stderr

@@ -79,7 +79,7 @@ def read_call(**defaults: Any) -> RecipeCall:
 
 
 def required_module(name: str, package: str) -> Any:
-    """Return a Python module, or leave with the exit code for a missing tool."""
+    """Return a Python module, or exit with the code for a missing tool."""
     try:
         return importlib.import_module(name)
     except ImportError:
@@ -87,7 +87,7 @@ def required_module(name: str, package: str) -> Any:
 
 
 def require_program(name: str, package: str) -> None:
-    """Leave with the exit code for a missing tool unless there is an executable of that name."""
+    """Exit with the code for a missing tool unless there is an executable of that name."""
     if shutil.which(name) is None:
         leave(f"{name} is not installed: it is part of {package}")
 
@@ -119,6 +119,6 @@ def write_buildings(call: RecipeCall, on_building: NDArray[np.bool_]) -> None:
 
 
 def leave(reason: str) -> NoReturn:
-    """Leave with the exit code for a detector that cannot run here."""
+    """Exit with the code for a detector that cannot run here."""
     print(reason, file=sys.stderr)
     raise SystemExit(_SKIP)
