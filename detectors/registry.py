@@ -16,6 +16,7 @@ DETECTORS = Registry(
     Detector,
     {
         "command": "detectors.external.command_detector:Command",
+        "dempster-shafer": "detectors.dempster_shafer.fusion_detector:DempsterShafer",
         "improved": "detectors.lines.improved:Improved",
         "ndsm": "detectors.ndsm.ndsm_detector:NDSM",
         "original": "detectors.lines.original:Original",

@@ -1,0 +1,1 @@
+"""The Dempster-Shafer detector: masses, cue maps, detector, trace and steps."""

@@ -1,0 +1,96 @@
+"""The Dempster-Shafer detector: cue maps on surfaces that are known, and whole scenes."""
+
+import numpy as np
+import pytest
+
+import roofbench as rb
+from roofbench.core.errors import ParameterError
+from roofbench.detectors.dempster_shafer.cue_maps import cue_maps
+from roofbench.detectors.dempster_shafer.fusion_detector import DempsterShafer
+from roofbench.scenes.builtin import hamlet
+
+GRID = rb.Grid.covering((0, 0, 40, 40), 1.0)
+
+
+def points_of(surface, *, returns=1, number=1, per_cell=1):
+    """Return a point in the middle of each cell of a grid of 40 x 40 m."""
+    x, y = (axis.ravel() + 0.5 for axis in np.meshgrid(np.arange(40.0), np.arange(40.0)))
+    z = surface(x, y).astype(float)
+    return rb.PointCloud(
+        x, y, z, return_number=np.full(len(x), number, np.uint8), number_of_returns=np.full(len(x), returns, np.uint8)
+    )
+
+
+def maps(*clouds, window=1.0):
+    columns = ("x", "y", "z", "return_number", "number_of_returns")
+    cloud = rb.PointCloud(**{name: np.concatenate([getattr(one, name) for one in clouds]) for name in columns})
+    return cue_maps(cloud, cloud.z.astype(np.float32), GRID, window=window, vegetation=None)
+
+
+def test_a_tilted_plane_has_no_texture_and_single_returns_no_pulse_difference():
+    found = maps(points_of(lambda x, y: 0.3 * x + 0.2 * y))
+    assert found.strength[10:-10, 10:-10] == pytest.approx(0, abs=1e-4)
+    assert found.pulse_difference is None
+    assert found.height[0, 0] == pytest.approx(0.3 * 0.5 + 0.2 * 39.5)
+
+
+def test_a_ridge_is_directed_and_a_rough_crown_is_not():
+    ridge = maps(points_of(lambda x, y: 8 - 0.5 * abs(x - 20)))
+    crown = maps(points_of(lambda x, y: 6 + np.random.default_rng(0).normal(0, 1.0, len(x))))
+    assert ridge.strength[20, 20] > 0.1
+    assert ridge.directedness[20, 20] == pytest.approx(0, abs=1e-3)
+    assert np.median(crown.directedness) > 0.5
+    assert np.median(crown.strength) > np.max(ridge.strength)
+
+
+def test_crowns_have_a_pulse_difference_and_walls_do_not():
+    def crown(x, y):
+        return np.where((abs(x - 10) < 4) & (abs(y - 10) < 4), 7.0, 0.0)
+
+    ground = points_of(lambda x, y: 0 * x, number=2, returns=2)
+    tree = points_of(crown, number=1, returns=2)
+    wall = points_of(lambda x, y: np.where((abs(x - 30.5) < 0.6), 7.0, 0.0), number=1, returns=2)
+    assert maps(ground, tree).pulse_difference[30, 10] == pytest.approx(7.0)
+    assert maps(ground, wall).pulse_difference[:, 28:33] == pytest.approx(7.0, abs=7.0)
+    assert maps(ground, tree).pulse_difference[5, 30] == 0
+
+
+def test_most_buildings_of_the_hamlet_are_found():
+    scene = hamlet(1)
+    found = rb.detect(scene, "dempster-shafer")
+    evaluation = rb.evaluate(found, scene.reference)
+    assert evaluation.object.quality > 0.6
+    assert set(found.attributes) == {"height", "support"}
+    assert (found.attributes["height"] > 2).all()
+    assert (found.attributes["support"] > 1 / 3).all()
+
+
+def test_a_scene_of_points_alone_and_one_without_buildings():
+    scene = hamlet(1)
+    bare = rb.Scene("bare", scene.extent, points=scene.points)
+    assert len(rb.detect(bare, "dempster-shafer")) > 5
+    meadow = rb.Scene("meadow", (0, 0, 40, 40), points=points_of(lambda x, y: 0 * x))
+    assert len(rb.detect(meadow, "dempster-shafer")) == 0
+
+
+def test_the_second_pass_refuses_regions_and_adds_none():
+    scene = hamlet(2)
+    once, twice = DempsterShafer(second_pass=False).trace(scene), DempsterShafer().trace(scene)
+    assert (once.accepted == once.opened).all()
+    assert (twice.opened == once.opened).all()
+    assert not (twice.accepted & ~twice.opened).any()
+
+
+def test_bounds_in_the_wrong_order_are_refused():
+    with pytest.raises(ParameterError, match="low_height must be smaller than high_height"):
+        DempsterShafer(low_height=4.0)
+
+
+def test_the_steps_show_every_map():
+    steps = list(DempsterShafer().steps(hamlet(1), np.random.default_rng(0)))
+    assert [step.name for step in steps] == ["cues", "probabilities", "classes", "support", "regions", "outlines"]
+    titles = [panel.title for panel in steps[0].panels]
+    assert titles[0] == "height above ground"
+    assert "texture directedness" in titles
+    assert "vegetation" in titles
+    assert any("tree or grass" in panel.title for panel in steps[1].panels)
