@@ -631,7 +631,7 @@ def test_an_area_of_another_place(files, refused):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "give --points or --ortho"),
+        ([], "give --points, --dsm or --ortho"),
         (["points.laz", "--reference", "reference.gpkg", "--reference-from-class"], "not both"),
         (["points.laz", "ortho.tif", "--ortho-from-points"], "not both"),
         (["ortho.tif", "--reference-from-class"], "needs points: give --points"),
