@@ -143,13 +143,14 @@ def _lead(report: Report) -> str:
     same = [_short(entry.label) for entry in ranked[1:] if set(entry.group) & set(best.group)]
     if same:
         return f"{text}; the lead over {listed(same)} is not significant with {counted(len(board.scenes), 'scene')}."
+    too_few = ""
     if len(ranked) > 1 and not best.group:
-        text += "; there are too few scenes to test whether the lead is significant"
+        too_few = " There are too few scenes to test whether the lead is significant."
     rest = [
         f"{_short(entry.label)} {value_text(entry.cells[index.key].value, index.unit, undefined='no')}"
         for entry in ranked[1:4]
     ]
-    return f"{text}{', before ' + listed(rest) if rest else ''}."
+    return f"{text}{', before ' + listed(rest) if rest else ''}.{too_few}"
 
 
 def _tiles(report: Report) -> list[dict[str, Any]]:
@@ -181,16 +182,20 @@ def _pooled(board: Leaderboard) -> list[Entry]:
 def _board(board: Leaderboard) -> dict[str, Any]:
     """Return a leaderboard in the form of the template."""
     grouped = any(entry.group for entry in board.entries)
-    groups = [(name, len(list(members))) for name, members in groupby(_group_of(index) for index in board.indices)]
+    # The summary stands first, so that a phone shows the score; the other indices are shown on request.
+    indices = (*board.summary, *(index for index in board.indices if index not in board.summary))
+    shown = len(board.summary)
+    groups = [("", shown, "group")]
+    groups += [(name, len(list(found)), "group more") for name, found in groupby(map(_group_of, indices[shown:]))]
     starts = {0}
-    for _, count in groups:
+    for _, count, _ in groups:
         starts.add(max(starts) + count)
     heads = [_Head("rank", "rank", sorted="ascending"), _Head("detector", "name")]
     heads += [_Head("group", "left")] if grouped else []
-    heads += [_Head("scenes")]
     css = []
-    for place, index in enumerate(board.indices):
-        css.append(" ".join(["start"] * (place in starts) + ["main"] * (index == board.rank_by)))
+    for place, index in enumerate(indices):
+        words = ["start"] * (place in starts) + ["main"] * (index == board.rank_by) + ["more"] * (place >= shown)
+        css.append(" ".join(words))
         heads.append(
             _Head(
                 css=css[-1],
@@ -202,11 +207,12 @@ def _board(board: Leaderboard) -> dict[str, Any]:
             )
         )
     heads += [
-        _Head("objects", "start", first="descending"),
+        _Head("scenes", "start"),
+        _Head("objects", first="descending"),
         _Head("CPU s", meaning="median processor time of a run, seconds"),
         _Head("MB", meaning="highest resident memory of all runs"),
     ]
-    best = {(index.key, pooling): _best(board, index, pooling) for index in board.indices for pooling in _POOLINGS}
+    best = {(index.key, pooling): _best(board, index, pooling) for index in indices for pooling in _POOLINGS}
     rows = [
         {
             "entry": entry,
@@ -218,14 +224,15 @@ def _board(board: Leaderboard) -> dict[str, Any]:
                     if _same(entry.cells[index.key], best[index.key, entry.pooling])
                     else css[place],
                 }
-                for place, index in enumerate(board.indices)
+                for place, index in enumerate(indices)
             ],
         }
         for entry in board.entries
     ]
     return {
         "evaluator": board.evaluator,
-        "leading": 3 + grouped,
+        "leading": 2 + grouped,
+        "hidden": len(indices) - shown,
         "grouped": grouped,
         "groups": groups,
         "heads": heads,

@@ -33,6 +33,7 @@ from .cells import HIGH, LOW, VOID
 from .patches import patch_sizes
 from .rectangles import overlap_area, row_span
 from .reshaping import move_edge
+from .selection import ordered_value
 from .threads import ONE_THREAD, Threads
 
 __all__ = ["lower_storeys"]
@@ -294,7 +295,7 @@ def _base_of(surface: _Surface, box: Rectangles, known: Integers) -> int:
             known[side] += 1
     if n < _FEWEST_CELLS:
         return -1
-    base = int(np.partition(border[:n], n // 2)[n // 2])
+    base = ordered_value(border, n, n // 2)
     level, higher = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
     for i in range(len(cells)):
         r, c, side = cells[i, 0], cells[i, 1], cells[i, 2]
