@@ -21,12 +21,19 @@ from .palettes import PALETTES, draw_colour
 from .parcels import Parcel, Sites
 from .recipe import SceneParameters
 from .roofscape import furnish
+from .row_houses import compose_row, is_row
 from .solids import Roof, Solid, Texture
 from .streams import Draws, stream
 
 __all__ = ["Town", "build"]
 
 _DRAWS = 96
+#: Random numbers of the look of a house of a row; share of the houses with own colours besides those by variety;
+#: random numbers of a row, and most parts of one.
+_HOUSE_DRAWS = 104
+_OWN_COLOUR = 0.2
+_ROW_DRAWS = 10 * _HOUSE_DRAWS
+_MOST_PARTS = 20
 #: Least distance of two buildings, metres.
 _APART = 0.3
 
@@ -67,7 +74,8 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
     solids: list[Solid] = []
     garages: list[tuple[int, Solid]] = []
     built = np.zeros(len(sites), dtype=bool)
-    taken = _Taken(len(sites) * 8)
+    rows = stream(seed, "rows").random((len(sites), _ROW_DRAWS)) if recipe.row_share > 0 else None
+    taken = _Taken(len(sites) * (8 if rows is None else _MOST_PARTS))
     number = counted = 0
     for site in np.argsort(sites.mark, kind="stable"):
         if counted == recipe.buildings:
@@ -76,6 +84,9 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
         draws = Draws(shapes[site])
         zone = int(sites.zone[site])
         compose = {HALLS: _hall, TOWERS: _tower}.get(zone, compose_house)
+        in_row = rows is not None and compose is compose_house and is_row(parcel, recipe)
+        if in_row:
+            compose = compose_row
         groups = compose(parcel, recipe, draws)
         # Without its house a parcel has no garage either.
         if not groups or not _fits(groups[0], taken, recipe):
@@ -86,14 +97,21 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
             group, worth = _within_quota(whole, recipe.buildings - counted, recipe.counted)
             if not group:
                 break
-            _paint(group, rank, zone, recipe, Draws(colours[site][rank * 6 :]), Draws(greens[site][rank * 2 :]))
+            if rows is not None and in_row:
+                numbers = rows[site][rank * _HOUSE_DRAWS : (rank + 1) * _HOUSE_DRAWS]
+                # Houses of a row that do not differ have the colours of the first one.
+                look = numbers if numbers[-1] < _OWN_COLOUR + recipe.row_variety else rows[site]
+                _paint(group, 0, zone, recipe, Draws(look), Draws(look[6:]))
+                structures = furnish(group, zone, Draws(numbers[8:]))
+            else:
+                _paint(group, rank, zone, recipe, Draws(colours[site][rank * 6 :]), Draws(greens[site][rank * 2 :]))
+                structures = furnish(group, zone, Draws(roofs[site][rank * 48 :])) if rank == 0 else []
             floor = float(terrain.sample(group[0].x, group[0].y))
-            structures = furnish(group, zone, Draws(roofs[site][rank * 48 :])) if rank == 0 else []
             taken.add(group)
             for solid in (*group, *structures):
                 solid.owner, solid.base = number, floor
                 solids.append(solid)
-            if rank:
+            if rank and not in_row:
                 garages.append((int(site), group[0]))
             number += 1
             counted += worth

@@ -40,7 +40,7 @@ _OVERLAP = 0.12
 _FOOTPRINT = 0.22
 _DEAD_ZONE = 1.0
 _MOST = 5
-_MODES = {"first": 0, "last": 1, "all": 2}
+_MODES = {"first": 0, "last": 1, "all": 2, "single": 0}
 _CHUNK = 250_000
 _POOL = int(Cover.POOL)
 _BUILDING, _ROOF_STRUCTURE, _HEDGE = int(Body.BUILDING), int(Body.ROOF_STRUCTURE), int(Body.HEDGE)
@@ -82,7 +82,9 @@ def scan(world: World, origin: tuple[float, float]) -> PointCloud:
     for start in range(0, len(places), _CHUNK):
         pieces.append(_scan_chunk(places[start : start + _CHUNK], start, ground, standing, leaves, scanner))
     xyz, returns, intensity, classes = (np.concatenate(column) for column in zip(*pieces, strict=True))
-    known = recipe.pulse == "all"
+    known = recipe.pulse in ("all", "single")
+    if recipe.pulse == "single":
+        returns[:] = 1
     return PointCloud(
         x=np.round((xyz[:, 0] + origin[0]) * 100) / 100,
         y=np.round((xyz[:, 1] + origin[1]) * 100) / 100,

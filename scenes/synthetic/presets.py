@@ -18,6 +18,9 @@ toronto-a, -b           Yu et al. 2013, section 3: 1.45 km2 in all, 130 and 153 
 vaihingen-a, -b         2013: 263 and 290 entities, 3 775 182 and 3 582 656 points. Our choice: 750 x 750 m and
                         731 x 731 m, which is 6.7 points per m2 as the ISPRS benchmark states for that flight; an RGBI
                         image of 0.25 m
+rows, old-town          No paper's: our choice for grouping. Rows of houses wall to wall under common roofs, a fourth
+                        of the party walls with a step, trees in the gaps; an old town of narrow houses of different
+                        heights, most gables to the street, courts with annexes, scanned by pulses of a single return
 ======================  =====================================================================================
 
 The references of Fairfield, Moonee Ponds and Knox were measured in the orthoimage (2010, section 4.3; 2011, section
@@ -214,6 +217,24 @@ _VAIHINGEN: dict[str, Any] = {
     "horizontal_noise": 0.08,
 }
 
+_ROWS: dict[str, Any] = {
+    "width": 240, "height": 220, "epsg": 25832, "elevation": 4, "slope": 0.3, "undulation": 1.5, "orientation": 17,
+    "orientation_spread": 0.5, "street_width": 13, "block_length": 150, "parcel_width": 44, "parcel_depth": 30,
+    "setback": 4, "park_share": 0.0, "buildings": 120, "row_share": 0.85, "row_house_width": 5.8, "row_variety": 0.25,
+    "row_gables": 0.15, "two_storeys": 0.9, "roof_pitch": 36, "flat_roofs": 0.1, "roof_palette": "central-european",
+    "outbuildings": 0.35, "gap": 3.5, "tree_density": 38, "tree_gap": 0.6, "gap_trees": 0.5, "tree_height": 8,
+    "point_spacing": 0.4, "pulse": "all", "bands": "rgbi", "gsd": 0.2, "view_angle": 6,
+}  # fmt: skip
+_OLD_TOWN: dict[str, Any] = {
+    "width": 220, "height": 200, "epsg": 25832, "elevation": 35, "slope": 0.8, "undulation": 3, "orientation": -24,
+    "winding": 8, "orientation_spread": 1, "street_width": 8, "block_length": 105, "parcel_width": 35,
+    "parcel_depth": 21, "setback": 0, "park_share": 0.05, "buildings": 150, "row_share": 1.0, "row_house_width": 6.5,
+    "row_variety": 0.75, "row_gables": 0.45, "storey_height": 3.3, "two_storeys": 1.0, "roof_pitch": 44,
+    "flat_roofs": 0.05, "roof_palette": "central-european", "outbuildings": 0.7, "gap": 1.3, "tree_density": 22,
+    "tree_gap": 0.3, "gap_trees": 0.25, "tree_height": 9, "point_spacing": 0.35, "pulse": "single", "bands": "rgbi",
+    "gsd": 0.2, "view_angle": 6,
+}  # fmt: skip
+
 #: The three parts of Fairfield have a smaller range of heights than the whole.
 _PART = _FAIRFIELD | {"undulation": 4}
 
@@ -234,6 +255,8 @@ _FULL: Mapping[str, dict[str, Any]] = {
     "vaihingen-a": _VAIHINGEN | {"width": 750, "height": 750, "buildings": 263, "point_spacing": 0.411},
     "vaihingen-b": _VAIHINGEN
     | {"width": 731, "height": 731, "buildings": 290, "open_share": 0.66, "point_spacing": 0.411},
+    "rows": _ROWS,
+    "old-town": _OLD_TOWN,
 }  # fmt: skip
 
 #: Side of a small version, metres, and its buildings (or entities): what every seed has room for.
@@ -248,6 +271,8 @@ _SMALL: Mapping[str, tuple[int, int]] = {
     "toronto-b": (260, 3),
     "vaihingen-a": (110, 8),
     "vaihingen-b": (110, 8),
+    "rows": (150, 34),
+    "old-town": (110, 27),
 }
 
 

@@ -81,6 +81,20 @@ class SceneParameters(Parameterised):
     garage_rows: float = parameter(
         0.0, minimum=0, maximum=1, doc="share of the parcels with a row of garages instead of a house"
     )
+    row_share: float = parameter(
+        0.0, minimum=0, maximum=1, doc="share of the parcels with a row of houses wall to wall instead of a house"
+    )
+    row_house_width: float = parameter(6.0, unit="m", minimum=4, maximum=12, doc="of a house of a row, mean")
+    row_variety: float = parameter(
+        0.3,
+        minimum=0,
+        maximum=1,
+        doc="share of party walls with a step of the eaves; widths and depths differ with it",
+        swept=(0, 0.3, 0.6, 1),
+    )
+    row_gables: float = parameter(
+        0.2, minimum=0, maximum=1, doc="share of rows in which each house turns its gable to the street"
+    )
     building_size: float = parameter(
         1.0, minimum=0.4, maximum=1.6, doc="factor on the sides of buildings", swept=(0.6, 0.8, 1.0, 1.2)
     )
@@ -108,6 +122,13 @@ class SceneParameters(Parameterised):
     tree_gap: float = parameter(
         1.5, unit="m", minimum=-3, maximum=30, doc="least distance of a trunk from a roof's edge", swept=(0, 2, 4, 8)
     )
+    gap_trees: float = parameter(
+        0.0,
+        minimum=0,
+        maximum=1,
+        doc="share of the gaps of 1 to 6 m between buildings with a tree in it, whose crown reaches over both",
+        swept=(0, 0.3, 0.6, 1),
+    )
     tree_height: float = parameter(7.0, unit="m", minimum=2, maximum=40, doc="median")
     tree_clumping: float = parameter(0.3, minimum=0, maximum=1, doc="share of trees that stand in clumps")
     woodland: float = parameter(0.0, minimum=0, maximum=1, doc="share of trees in woods beside the parcels")
@@ -119,7 +140,11 @@ class SceneParameters(Parameterised):
     point_spacing: float = parameter(
         0.5, unit="m", minimum=0.1, maximum=5, doc="root of the ground area per pulse", swept=(0.35, 0.5, 1, 1.5)
     )
-    pulse: str = parameter("all", choices=("first", "last", "all"), doc="returns that the cloud holds")
+    pulse: str = parameter(
+        "all",
+        choices=("first", "last", "all", "single"),
+        doc="returns that the cloud holds; single: the first ones, written as 1 of 1",
+    )
     scan_angle: float = parameter(12.0, unit="deg", minimum=0, maximum=30, doc="largest off-nadir angle of a pulse")
     vertical_noise: float = parameter(
         0.05, unit="m", minimum=0, maximum=1, doc="standard deviation", swept=(0.05, 0.15, 0.3)

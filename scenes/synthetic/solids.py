@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -102,6 +102,10 @@ class Solid:
         if self.roof in (Roof.GABLE, Roof.HIP):
             return self.eave + self.pitch * min(self.width, self.length if self.roof == Roof.HIP else self.width) / 2
         return self.eave
+
+    def turned(self) -> Solid:
+        """Return a solid over the same rectangle whose ridge runs across it."""
+        return replace(self, angle=self.angle + math.pi / 2, length=self.width, width=self.length)
 
     def corners(self, grow: float = 0.0) -> NDArray[np.float64]:
         """Return the rectangle's corners, counter-clockwise, shape (4, 2), grown by `grow` metres each side."""

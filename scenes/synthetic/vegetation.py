@@ -30,6 +30,7 @@ from .streams import stream
 __all__ = ["Trees", "grow", "nearest_rectangle", "rectangle_table"]
 
 _LOBES = 13
+_GAPS = (1.0, 6.0)
 _STREET_TREES = 0.16
 _STREET_TREE_STEP = 9.0
 
@@ -77,7 +78,31 @@ def grow(terrain: Elevation, layout: Layout, buildings: list[Solid], recipe: Sce
     mark = draws[:, 0] * (1 - 0.85 * recipe.woodland * np.clip((away - 4) / 16, 0, 1))
     order = np.argsort(np.where(allowed, mark, np.inf), kind="stable")
     kept = order[: min(round(recipe.tree_density * recipe.hectares), int(allowed.sum()))]
-    return _crowns(kept, x[kept], y[kept], draws[kept], terrain, recipe, seed)
+    x, y = x[kept], y[kept]
+    if recipe.gap_trees > 0:
+        _move_into_gaps(x, y, buildings, recipe.gap_trees, seed)
+    return _crowns(kept, x, y, draws[kept], terrain, recipe, seed)
+
+
+def _move_into_gaps(
+    x: NDArray[np.float64], y: NDArray[np.float64], buildings: list[Solid], share: float, seed: int
+) -> None:
+    """Move the first trees, in place, to the middle of a share of the gaps between buildings.
+
+    A gap is the shortest line between two buildings, `_GAPS` metres long.
+    """
+    import shapely
+
+    parts = [solid for solid in buildings if solid.body == Body.BUILDING]
+    outlines = shapely.polygons(np.array([part.corners() for part in parts]).reshape(-1, 4, 2))
+    owner = np.array([part.owner for part in parts], dtype=np.int64)
+    one, two = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=_GAPS[1])
+    pairs = owner[one] < owner[two]
+    lines = shapely.shortest_line(outlines[one[pairs]], outlines[two[pairs]])
+    lines = lines[shapely.length(lines) >= _GAPS[0]]
+    middle = shapely.get_coordinates(shapely.line_interpolate_point(lines, 0.5, normalized=True))
+    middle = middle[stream(seed, "gap-trees").random(len(middle)) < share][: len(x)]
+    x[: len(middle)], y[: len(middle)] = middle.T
 
 
 def _places(

@@ -12,7 +12,7 @@ from roofbench.scenes.synthetic import SceneParameters
     [
         ({"tree_density": -1}, r"tree_density must be from 0 to 300 1/ha, not -1"),
         ({"slope": 90}, r"slope must be from 0 to 40 deg, not 90"),
-        ({"pulse": "second"}, r"pulse must be one of first, last, all, not 'second'"),
+        ({"pulse": "second"}, r"pulse must be one of first, last, all, single, not 'second'"),
         ({"tree_densty": 3}, r"no parameter 'tree_densty' \(did you mean 'tree_density'\?\)"),
         ({"point_spacing": 0}, r"point_spacing must be from 0.1 to 5 m, not 0"),
         ({"parcel_depth": 150}, r"parcel_depth of 150 m does not fit 110 x 110 m: it must be at most 102 m here"),

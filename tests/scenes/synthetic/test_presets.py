@@ -37,8 +37,12 @@ SMALL = [name for name in preset_names() if name.endswith("-small")]
 
 
 def counted(reference, name):
-    """What a preset's number counts: buildings at Moonee Ponds and Knox, rectangles elsewhere."""
-    return len(set(reference.building_ids.tolist())) if name.startswith(("moonee", "knox")) else len(reference)
+    """What a preset's number counts: buildings at Moonee Ponds, Knox and in rows, rectangles elsewhere."""
+    return (
+        len(set(reference.building_ids.tolist()))
+        if name.startswith(("moonee", "knox", "rows", "old-town"))
+        else len(reference)
+    )
 
 
 @pytest.mark.parametrize("name", AWRANGJEB)

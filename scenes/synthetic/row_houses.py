@@ -1,0 +1,67 @@
+"""Rows of houses: several buildings wall to wall on one wide parcel.
+
+Nouns
+-----
+row
+    Houses that share party walls, under one ridge along the street or each with a gable that faces it.
+variety
+    Share of the party walls at which eaves and fronts step, and the spread of widths and depths. Without it a row is
+    one long roof, and nothing but chimneys shows where one house ends.
+annex
+    A low flat part behind a house, of the same building.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .parcels import Parcel
+from .recipe import SceneParameters
+from .solids import Roof, Solid
+from .streams import Draws
+
+__all__ = ["compose_row", "is_row"]
+
+#: Most houses of a row.
+_MOST = 10
+
+
+def is_row(parcel: Parcel, recipe: SceneParameters) -> bool:
+    """Return whether a parcel of houses carries a row."""
+    return parcel.even[1] < recipe.row_share
+
+
+def compose_row(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> list[list[Solid]]:
+    """Return the parts of each house of a row, in order along the street."""
+    variety = recipe.row_variety
+    usable = parcel.width - max(0.4, recipe.gap * draws.between(0.7, 1.3))
+    count = min(max(2, round(usable / (recipe.row_house_width * draws.between(0.9, 1.1)))), _MOST)
+    deep = min(draws.between(8.0, 10.5) * recipe.building_size, parcel.depth - recipe.setback - 3)
+    front = -parcel.depth / 2 + recipe.setback * draws.between(0.8, 1.25)
+    eave = recipe.storey_height * (2 if draws.chance(recipe.two_storeys) else 1) * draws.between(0.94, 1.06)
+    flat, faces_street = draws.chance(recipe.flat_roofs), draws.chance(recipe.row_gables)
+    pitch = math.tan(math.radians(min(max(recipe.roof_pitch * draws.between(0.9, 1.1), 4), 62)))
+    roof = {"roof": Roof.FLAT if flat else Roof.GABLE, "pitch": 0.0 if flat else pitch}
+    shares = [1 + 0.35 * variety * (2 * draws.unit() - 1) for _ in range(count)]
+    edge, top, start = -usable / 2, eave, front
+    houses: list[list[Solid]] = []
+    for share in shares:
+        wide = usable * share / math.fsum(shares)
+        steps, up, back = draws.chance(variety), draws.between(-1.2, 1.2), draws.between(0.0, 1.2)
+        own = deep * (1 + 0.2 * variety * (2 * draws.unit() - 1))
+        if steps:
+            top, start = eave + up, front + back * variety
+        middle = start + own / 2
+        house = parcel.place(edge + wide / 2, middle, wide, own, eave=top, **roof)
+        # A placed solid has its ridge along the longer side.
+        if (own > wide) != faces_street:
+            house = house.turned()
+        parts = [house]
+        if draws.chance(recipe.outbuildings) and start + own + 4.5 < parcel.depth / 2:
+            narrow, long, side = wide * draws.between(0.45, 0.75), draws.between(2.5, 4.2), draws.chance(0.5)
+            shift = (wide - narrow) / 2 * (1 if side else -1)
+            at = start + own + long / 2 - 0.2
+            parts.append(parcel.place(edge + wide / 2 + shift, at, narrow, long, eave=draws.between(2.6, 3.1)))
+        houses.append(parts)
+        edge += wide
+    return houses

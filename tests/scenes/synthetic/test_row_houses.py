@@ -1,0 +1,74 @@
+"""Rows of houses wall to wall, trees in the gaps between them, and pulses of a single return."""
+
+import numpy as np
+import pytest
+import shapely
+
+import roofbench as rb
+from roofbench.scenes.synthetic.presets import preset
+from roofbench.scenes.synthetic.solids import Body
+from roofbench.scenes.synthetic.world import make_world
+
+EXACT = {"reference_error": 0.0, "digitised": "ground"}
+
+
+def houses(scene):
+    """Union of the parts of each building, buildings in order."""
+    polygons, ids = scene.reference.polygons, scene.reference.building_ids
+    return np.array([shapely.union_all(polygons[ids == one]) for one in np.unique(ids)])
+
+
+@pytest.mark.parametrize("name", ["rows-small", "old-town-small"])
+def test_most_houses_share_a_wall_with_a_neighbour_and_none_overlap(name):
+    found = houses(rb.make_scene(name, seed=2))
+    one, two = shapely.STRtree(found).query(found, predicate="dwithin", distance=0.05)
+    pairs = one < two
+    walls = shapely.length(
+        shapely.intersection(shapely.buffer(found[one[pairs]], 0.05), shapely.boundary(found[two[pairs]]))
+    )
+    assert shapely.area(shapely.intersection(found[one[pairs]], found[two[pairs]])).max() < 0.1
+    assert np.median(walls) > 6
+    assert len(np.unique(np.concatenate([one[pairs], two[pairs]]))) > 0.8 * len(found)
+
+
+def steps(variety):
+    """Differences in eaves of neighbouring houses of rows."""
+    recipe = preset("rows-small", row_variety=variety, row_share=1.0, slope=0.0, undulation=0.0, buildings=30)
+    solids = make_world(recipe, 3).solids
+    main = solids.body == Body.BUILDING
+    first = np.unique(solids.owner[main], return_index=True)[1]
+    eaves, place = solids.eave[main][first], solids.rectangle[main][first, :2]
+    distance = np.hypot(*np.diff(place, axis=0).T)
+    return np.abs(np.diff(eaves))[distance < 8]
+
+
+def test_without_variety_no_eaves_step_and_with_it_most_do():
+    assert (steps(0.0) < 0.01).all()
+    assert (steps(1.0) > 0.01).mean() > 0.9
+    assert 0.2 < (steps(0.5) > 0.01).mean() < 0.8
+
+
+def test_gap_trees_stand_between_buildings_and_change_no_building():
+    plain, planted = (make_world(preset("rows-small", gap_trees=share), 1) for share in (0.0, 1.0))
+    np.testing.assert_array_equal(plain.solids.rectangle, planted.solids.rectangle)
+    scene = rb.make_scene("rows-small", seed=1)
+    found = houses(scene)
+    x, y = planted.trees.x + scene.extent[0], planted.trees.y + scene.extent[1]
+    moved = ~np.isin(np.round(planted.trees.x, 6), np.round(plain.trees.x, 6))
+    assert moved.sum() >= 3
+    near = np.sort(shapely.distance(shapely.points(x, y)[moved, None], found[None, :]), axis=1)[:, :2]
+    assert np.median(near[:, 1]) < 3.1
+    reaches = planted.trees.radius[moved] > near[:, 1]
+    assert reaches.any()
+
+
+def test_a_single_return_scanner_writes_one_of_one():
+    single, first = (rb.make_scene("old-town-small", seed=1, pulse=pulse).points for pulse in ("single", "first"))
+    assert (single.return_number == 1).all()
+    assert (single.number_of_returns == 1).all()
+    np.testing.assert_array_equal(single.z, first.z)
+
+
+def test_a_row_is_the_same_whatever_stands_elsewhere():
+    few, many = (rb.make_scene("rows-small", seed=4, buildings=count) for count in (12, 30))
+    np.testing.assert_array_equal(few.reference.polygons[:8], many.reference.polygons[:8])
