@@ -7,8 +7,8 @@ part
 block
     All that is built together (`blocks`).
 row
-    A block with at least `_CERTAIN_WALLS` certain party walls. Its parts are cut at their probable party walls, and
-    each piece is a house of its own unless it is smaller than `_ANNEX`.
+    A block with at least `_CERTAIN_WALLS` certain party walls, or a long and narrow one with `_WALLS_OF_LONG`. Its
+    parts are cut at their probable party walls, and each piece is a house of its own unless smaller than `_ANNEX`.
 building
     A block that is no row with all its parts, or a house of a row with its annexes. A part outside all blocks is a
     building, too.
@@ -31,8 +31,10 @@ from .rectangles import to_world
 
 __all__ = ["Levels", "find_levels"]
 
-#: Certain party walls that make a row of a block.
-_CERTAIN_WALLS = 4
+#: Certain party walls that make a row of a block, and of one of `_LONG` metres or more that is `_SLENDER` times as long
+#: as wide or more.
+_CERTAIN_WALLS, _WALLS_OF_LONG = 3, 2
+_LONG, _SLENDER = 25.0, 2.0
 #: Square metres: smaller pieces of a row belong to the house that they touch most; the smallest piece that is one.
 _ANNEX, _PIECE = 15.0, 8.0
 #: Metres: pieces so close touch, and by how much outlines are closed when they are joined.
@@ -95,7 +97,7 @@ def find_levels(
     block = block_of(shapely.polygons(to_world(rectangles, grid)), blocks)
     certain = np.array([len(party_walls(one, height, state, grid, CERTAIN)) for one in rectangles], dtype=np.int64)
     walls_of_block = np.bincount(block[block >= 0], weights=certain[block >= 0], minlength=len(blocks))
-    row = walls_of_block >= _CERTAIN_WALLS
+    row = _are_rows(blocks, walls_of_block)
     outlines = outline_buildings(rectangles, blocks, grid)
     parts: list[Any] = []
     rectangle_of: list[int] = []
@@ -135,6 +137,15 @@ def find_levels(
         _objects(buildings),
         np.array(block_of_building, dtype=np.int64),
     )
+
+
+def _are_rows(blocks: NDArray[np.object_], walls: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which blocks are rows, from the number of their certain party walls."""
+    corners = shapely.get_coordinates(shapely.oriented_envelope(blocks)).reshape(-1, 5, 2)
+    sides = np.sort(np.hypot(*(corners[:, 1:3] - corners[:, :2]).transpose(2, 0, 1)), axis=1)
+    slender = (sides[:, 1] >= _LONG) & (sides[:, 1] >= _SLENDER * sides[:, 0])
+    rows: NDArray[np.bool_] = walls >= np.where(slender, _WALLS_OF_LONG, _CERTAIN_WALLS)
+    return rows
 
 
 def _objects(polygons: list[Any]) -> NDArray[np.object_]:
