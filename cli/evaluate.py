@@ -94,7 +94,8 @@ def evaluate(
 ) -> None:
     """Compare detected with reference footprints: 15 indices, and why each object counts as correct or wrong.
 
-    Files may be GeoJSON, GeoPackage, Shapefile, FlatGeobuf or GeoParquet, in a projected CRS in metres.
+    Files may be GeoJSON, GeoPackage, Shapefile, FlatGeobuf or GeoParquet, in a projected CRS in metres, or label images
+    (GeoTIFF with one id per building, or a mask whose components are the buildings).
     """
     from ..core.errors import InputError, ParameterError, UnsupportedError
     from ..evaluators.registry import ALL, DEFAULT, all_evaluators, make_evaluator

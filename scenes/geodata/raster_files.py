@@ -39,6 +39,7 @@ __all__ = [
     "read_image",
     "read_raster_header",
     "require_image_type",
+    "source_crs",
     "write_elevation",
     "write_image",
 ]
@@ -130,7 +131,7 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
             )
         own = crs
         if own is None and source.crs:
-            own = _source_crs(file, source)
+            own = source_crs(file, source)
         side = min(a, -e)
         grid = Grid(c, f, side, max(1, round(source.height * -e / side)), max(1, round(source.width * a / side)))
         colours = source.colorinterp
@@ -378,7 +379,8 @@ def _with_last_band(source: Any, colour: str) -> Iterator[Any]:
             yield view
 
 
-def _source_crs(file: Path, source: Any) -> str | None:
+def source_crs(file: Path, source: Any) -> str | None:
+    """Return the horizontal CRS of an open raster that has one; None where it is a local system."""
     from pyproj import CRS
     from pyproj.exceptions import CRSError as ProjError
 

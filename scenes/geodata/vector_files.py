@@ -24,6 +24,7 @@ from ...core.plain_paths import plain_path, plain_target
 from ...core.registry import nearest_hint
 from .crs import common_crs, crs_label, file_crs, named_crs, parse_crs, require_metric, same_crs
 from .footprints import Footprints, Repair
+from .label_images import ENDINGS, read_labels
 from .ogr_layers import layer_names, quiet, read_layer
 from .parquet_files import read_parquet, write_parquet
 from .vector_columns import storable_columns
@@ -78,7 +79,7 @@ def read_footprints(
     crs: str | None = None,
     to_crs: str | None = None,
 ) -> Footprints:
-    """Read footprints from a vector file.
+    """Read footprints from a vector file, or from a label image or mask (see `label_images`).
 
     Parameters
     ----------
@@ -111,7 +112,9 @@ def read_footprints(
     if crs is not None:
         crs = named_crs(crs)
     closed: list[Repair] = []
-    if DRIVERS.get(file.suffix.lower()) == "Parquet":
+    if file.suffix.lower() in ENDINGS:
+        geometries, columns, own_crs = read_labels(file)
+    elif DRIVERS.get(file.suffix.lower()) == "Parquet":
         geometries, columns, own_crs, closed = read_parquet(file)
     else:
         geometries, columns, own_crs, closed = _read_ogr(file, layer)
