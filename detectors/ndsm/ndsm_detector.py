@@ -165,11 +165,15 @@ class NDSM(Detector):
         )
 
     def measured(self, scene: Scene) -> Mapping[str, float]:
-        """Return the cell size, unless it is given."""
+        """Return the cell size in steps of 1/32 m, unless it is given.
+
+        Computers hold multiples of such a cell exactly, so that a point on the border of two cells falls into the same
+        one in every window; with cells of 0.35 m it does not.
+        """
         if self.cell is not None or scene.points is None or not len(scene.points):
             return {}
         points = scene.points.distinct()
-        return {"cell": default_cell(points, self._ground(scene).above(points), scene.extent)}
+        return {"cell": round(32 * default_cell(points, self._ground(scene).above(points), scene.extent)) / 32}
 
     def _ground(self, scene: Scene) -> Heights:
         return scene.heights if self.dem else heights_of(scene.points, None, scene.extent, cell=scene.ground_cell)

@@ -74,7 +74,7 @@ def test_neither_workers_nor_order_change_a_bit(folder, tmp_path):
 
 def test_values_that_a_detector_measures_are_shared_by_all_tiles(folder, tmp_path):
     result = detect(folder, tmp_path / "city.fgb", detector=make_detector("ndsm"))
-    assert result.measured.parameters == {"cell": pytest.approx(0.7)}
+    assert result.measured.parameters == {"cell": 22 / 32}
     assert result.measured.ground_cell is not None
 
 

@@ -1,0 +1,134 @@
+"""Tiles against the whole: ``python tests/performance/study_tiling.py SCENE WORK [--copies 4] [--detectors ndsm mpp]``.
+
+A scene folder is mirrored to N x N copies, every second one turned over so that neighbours meet in what both show, and
+written as a folder of tiles (WORK/town, kept for the next call). A detector then runs on the whole in memory and tile
+by tile, with the same measured values. Printed for each detector: the share of footprints of the whole that the tiles
+have, too (to a thousandth of their area), those centred farther than one halo from every seam by themselves, the time
+of both, and the peak memory of a worker. ``--only-tiles`` leaves the whole out, for towns that do not fit in memory:
+12 x 13 copies of Delft (265 x 230 m) are 3 x 3 km and 130 million points.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from roofbench.benchmark.execution.city import City, detect_city
+from roofbench.benchmark.execution.runner import Execution
+from roofbench.benchmark.execution.worker import detect
+from roofbench.benchmark.identity.recipes import SceneRecipe
+from roofbench.core.memory import highest_memory
+from roofbench.detectors.registry import make_detector
+from roofbench.scenes.folder import open_scene
+from roofbench.scenes.geodata.las_files import write_points
+from roofbench.scenes.geodata.points import PointCloud
+from roofbench.scenes.geodata.raster import Elevation, Grid, Image
+from roofbench.scenes.geodata.raster_files import write_elevation, write_image
+from roofbench.scenes.geodata.vector_files import read_footprints, write_footprints
+from roofbench.scenes.importing.tile_index import index_folder
+
+#: Share of the area by which a footprint may differ from its match.
+SAME = 1e-3
+
+
+def mirror(scene, folder, columns, rows):
+    """Write columns x rows copies of a scene, mirrored at their common borders, as a folder of tiles."""
+    xmin, ymin, xmax, ymax = scene.extent
+    width, height = xmax - xmin, ymax - ymin
+    points = scene.points
+    inside = (points.x >= xmin) & (points.x < xmax) & (points.y >= ymin) & (points.y < ymax)
+    points = points.take(inside)
+    for layer in ("points", "dem", "ortho"):
+        (folder / layer).mkdir(parents=True, exist_ok=True)
+    for column in range(columns):
+        for row in range(rows):
+            west, south = xmin + column * width, ymin + row * height
+            x, y = points.x - xmin, points.y - ymin
+            x, y = (width - x if column % 2 else x), (height - y if row % 2 else y)
+            copy = {name: getattr(points, name) for name in PointCloud.__dataclass_fields__}
+            cloud = PointCloud(**{**copy, "x": west + x, "y": south + y})
+            write_points(cloud, folder / "points" / f"{column}_{row}.laz", crs=scene.crs)
+            for layer, raster in (("dem", scene.dem), ("ortho", scene.image)):
+                if raster is None:
+                    continue
+                part = raster.window(scene.extent)
+                step = (slice(None, None, -1 if row % 2 else 1), slice(None, None, -1 if column % 2 else 1))
+                values = np.ascontiguousarray(part.values[..., step[0], step[1]])
+                grid = Grid(west, south + height, part.grid.gsd, *part.grid.shape)
+                name = folder / layer / f"{column}_{row}.tif"
+                if layer == "dem":
+                    write_elevation(Elevation(values, grid), name, crs=scene.crs)
+                else:
+                    write_image(Image(values, part.bands, grid), name, crs=scene.crs)
+    return index_folder(folder).scene
+
+
+def matched(whole, tiled):
+    """Return which footprints of the whole the tiles have, too."""
+    first, second = shapely.STRtree(tiled.polygons).query(whole.polygons, predicate="intersects")
+    apart = shapely.area(shapely.symmetric_difference(whole.polygons[first], tiled.polygons[second]))
+    least = np.full(len(whole), np.inf)
+    np.minimum.at(least, first, apart / whole.areas[first])
+    return least < SAME
+
+
+def share(rows):
+    """Return a share in words."""
+    return f"{100 * rows.mean():.2f} %" if len(rows) else "none"
+
+
+def from_seams(centres, side):
+    """Return the distance of centres from the nearest line of the grid of tiles, metres."""
+    return np.minimum(centres % side, side - centres % side).min(axis=1)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--copies", type=int, nargs="+", default=[4])
+    parser.add_argument("--detectors", nargs="+", default=["ndsm", "mpp"])
+    parser.add_argument("--tile", type=float, default=512.0)
+    parser.add_argument("--halo", type=float)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--only-tiles", action="store_true")
+    options = parser.parse_args()
+    town = options.work / "town"
+    if not (town / "scene.toml").is_file():
+        mirror(open_scene(options.scene), town, options.copies[0], options.copies[-1])
+    recipe, scene = SceneRecipe.of_folder(town), open_scene(town)
+    print(f"town of {scene.extent[2] - scene.extent[0]:.0f} x {scene.extent[3] - scene.extent[1]:.0f} m")
+    for name in options.detectors:
+        detector = make_detector(name)
+        halo = detector.halo if options.halo is None else options.halo
+        output = options.work / f"{detector.name}.gpkg"
+        started = time.perf_counter()
+        city = City(tile=options.tile, halo=options.halo)
+        result = detect_city(recipe, detector, output, city, execution=Execution(jobs=options.jobs), overwrite=True)
+        seconds = time.perf_counter() - started
+        print(
+            f"{name}: {result.tiles} tiles of {options.tile:g} m, halo {halo:g} m, {seconds:.0f} s with "
+            f"{options.jobs} workers, {result.peak_memory / 1e6:.0f} MB each; {result.footprints} footprints, "
+            f"{result.seams}, {result.measured.parameters}, failed {result.failed}",
+            flush=True,
+        )
+        if options.only_tiles:
+            continue
+        scene = open_scene(town)
+        scene.ground_cell = result.measured.ground_cell
+        started = time.perf_counter()
+        whole = detect(scene, detector.replaced(result.measured.parameters), stream=np.random.default_rng([0]))
+        print(f"  the whole: {time.perf_counter() - started:.0f} s, {len(whole)} footprints", flush=True)
+        write_footprints(whole, options.work / f"{detector.name}-whole.gpkg", overwrite=True)
+        same = matched(whole, read_footprints(output))
+        far = from_seams(whole.centres, options.tile) > halo
+        near = from_seams(whole.centres, options.tile) <= halo
+        for label, rows in (("all", np.ones(len(whole), dtype=bool)), ("beyond a halo", far), ("within a halo", near)):
+            print(f"  {label}: {same[rows].sum()} of {rows.sum()} identical ({share(same[rows])})", flush=True)
+    print(f"peak memory of this process {highest_memory() / 1e6:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()
