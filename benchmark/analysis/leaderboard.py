@@ -17,8 +17,10 @@ from ..plan import KeyedEvaluator
 from ..store.records import RunRow
 from ..store.writer import Store
 from .inference import (
+    HALF_SPLITS,
     LEVEL,
     bootstrap_interval,
+    first_places,
     holm,
     letter_groups,
     paired_p,
@@ -28,6 +30,8 @@ from .results import Cell, Entry, Leaderboard, UnsuccessfulRun
 
 __all__ = ["make_leaderboard", "repeat_command", "unsuccessful_runs"]
 
+#: Fewest scenes that are split into halves.
+_FEWEST_SPLIT = 4
 _RESAMPLES = 1000  # of pooled indices, each of which is summarised anew
 #: Different notes of runs that are shown at most, and scenes that are named in one.
 _MOST_ESTIMATES, _MOST_SCENES = 5, 4
@@ -87,6 +91,7 @@ def make_leaderboard(
     notes = [
         *skipping,
         *group_note,
+        *_stability(complete, ranking),
         *_notes(boards, scenes),
         *(f"{scene} has no reference and is left out" for scene in bare),
         *_estimates(rows, store),
@@ -258,6 +263,23 @@ def _groups(boards: Sequence[_Tally], index: Index) -> tuple[dict[str, str], lis
         f"scenes, Holm, level {LEVEL:g})"
     )
     return {board.label: letter for board, letter in zip(boards, letters, strict=True)}, [note]
+
+
+def _stability(boards: Sequence[_Tally], index: Index) -> list[str]:
+    """Return a note on how often the first detector is first on half of the scenes; none for fewer than four scenes."""
+    values = [board.scene_values(index) for board in boards]
+    scenes = sorted(set.intersection(*(set(found) for found in values))) if values else []
+    if len(boards) < 2 or len(scenes) < _FEWEST_SPLIT or index.better == "neither":
+        return []
+    sign = -1 if index.better == "lower" else 1
+    counts = first_places([[sign * found[scene] for scene in scenes] for found in values])
+    others = [
+        f"{board.label} in {count}" for board, count in zip(boards[1:], counts[1:].tolist(), strict=True) if count
+    ]
+    text = (
+        f"{boards[0].label} is first by mean {index.title} in {counts[0]} of {HALF_SPLITS} random halves of the scenes"
+    )
+    return [f"{text}; {', '.join(others)}" if others else text]
 
 
 def _described(evaluator: Evaluator) -> str:

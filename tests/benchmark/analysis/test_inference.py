@@ -7,7 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roofbench.benchmark.analysis.inference import (
+    HALF_SPLITS,
     bootstrap_interval,
+    first_places,
     holm,
     letter_groups,
     lowest_p,
@@ -114,3 +116,14 @@ def test_two_detectors_share_a_letter_exactly_if_they_do_not_differ(case):
 
 def pairs(count):
     return list(itertools.combinations(range(count), 2))
+
+
+def test_first_places_on_halves_of_the_scenes():
+    rng = np.random.default_rng(0)
+    noise = rng.normal(0, 0.1, (2, 20))
+    alike, ahead = first_places(noise), first_places(noise + np.array([[1.0], [0.0]]))
+    assert alike.sum() == ahead.sum() == HALF_SPLITS
+    assert ahead.tolist() == [HALF_SPLITS, 0]
+    assert alike.max() < HALF_SPLITS
+    assert first_places(noise).tolist() == alike.tolist(), "a fixed stream"
+    assert first_places([[1.0] * 5, [1.0] * 5]).tolist() == [HALF_SPLITS, 0], "equal: the earlier row"

@@ -175,6 +175,7 @@ def test_detectors_without_a_significant_difference_share_a_letter():
     assert board.notes == (
         "Detectors that share a letter do not differ significantly in quality (paired tests over 10 scenes, Holm, "
         "level 0.05)",
+        "good is first by mean quality in 28 of 50 random halves of the scenes; as good in 22",
     )
 
 
