@@ -1,3 +1,4 @@
+import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -112,6 +113,14 @@ def test_a_planted_drop_is_found(values):
     assert conclusions(result) == {"worse"}
     assert result.exit_code == 1
     assert all(conclusion.effect == pytest.approx(-0.03) for conclusion in result.conclusions)
+
+
+def test_csv_holds_plain_numbers_by_key(values):
+    result = gate(measured(values), measured(values, shift=0.03), 16)
+    rows = list(csv.DictReader(format_gate(result, "csv").splitlines()))
+    assert [row["index"] for row in rows] == [found.index.key for found in result.conclusions]
+    assert [float(row["effect"]) for row in rows] == [found.effect for found in result.conclusions]
+    assert {row["conclusion"] for row in rows} == {"worse"}
 
 
 def test_a_gain_is_better_and_passes(values):
