@@ -144,7 +144,7 @@ def _search_path() -> str:
     """Return where modules are found, without the working folder (unless roofbench lies there)."""
     here = Path.cwd().resolve()
     kept = [entry for entry in sys.path if entry and (Path(entry).resolve() != here or here == FOLDER.parent)]
-    return os.pathsep.join(kept)
+    return os.pathsep.join(map(os.path.abspath, kept))
 
 
 def _unevaluated(detected: bytes, task: str, reason: str) -> Outcome:

@@ -317,6 +317,26 @@ def test_a_worker_that_is_stopped_ends_its_program(program, tmp_path):
     assert not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux counts the highest memory")
+def test_the_memory_limit_of_a_run_covers_its_program(tmp_path):
+    from roofbench.benchmark.execution.isolation import IsolatedProcess
+    from roofbench.benchmark.execution.tasks import Task
+    from roofbench.benchmark.identity.recipes import PluginRecipe
+    from roofbench.benchmark.store.outcomes import Outcome
+    from roofbench.core.processes import Limits
+
+    file = tmp_path / "eats.py"
+    file.write_text("import time\nhoard = bytearray(b'x') * 900_000_000\ntime.sleep(60)\n")
+    detector = make_detector("command", {"run": f"{sys.executable} {file}"})
+    task = Task(
+        scene=SceneRecipe.of_preset("hamlet", seed=1), detector=PluginRecipe.of(detector), seed=0, evaluators=()
+    )
+    process = IsolatedProcess()
+    outcome = Outcome.from_bytes(process.call(task.to_json(), Limits(seconds=120, memory=800_000_000)))
+    process.close()
+    assert outcome.reason.startswith("memory limit of 800 MB exceeded")
+
+
 def test_the_folder_of_a_program_reveals_nothing(program, square, tmp_path, scene):
     """Neutral names, no reference, recipe, seed, provenance or times; the environment names no folder of the caller."""
     kept = tmp_path / "kept"
