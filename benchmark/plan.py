@@ -237,7 +237,7 @@ def _foreseen_skip(scene: SceneRecipe | Scene, requires: tuple[str, ...]) -> str
     if contents is None:
         return ""
     for need in requires:
-        if need not in contents and not (need in ("colour", "nir") and "image" in contents):
+        if need not in contents and not (need in ("colour", "brightness", "nir") and "image" in contents):
             return f"scene {scene.name!r} has no {INPUTS[need]}"
     return ""
 

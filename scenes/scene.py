@@ -33,6 +33,7 @@ INPUTS: Mapping[str, str] = {
     "points": "point cloud",
     "image": "orthoimage",
     "colour": "orthoimage with red, green and blue",
+    "brightness": "orthoimage with red, green and blue, or a grey one",
     "nir": "orthoimage with a near-infrared band",
     "dem": "bare-earth DEM",
 }
@@ -197,7 +198,9 @@ class Scene:
         image = self.image
         if image is None or need == "image":
             return image is not None
-        return image.is_colour if need == "colour" else need in image.bands
+        if need in ("colour", "brightness"):
+            return image.is_colour or (need == "brightness" and "grey" in image.bands)
+        return need in image.bands
 
     def require(self, requires: tuple[str, ...]) -> None:
         """Raise `MissingInputError` when the scene lacks one of the inputs."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -48,6 +48,8 @@ _EXTENSION_PART = 3.5
 #: Root mean square distance from its line above which a segment contains a missed corner: in point spacings, and in
 #: pixels, because the staircase of a mask is no corner.
 _MISSED_CORNER, _STAIRCASE = 0.4, 0.5
+#: Note on grey images.
+_GREY = "the image is grey: no line is tested for vegetation, and roofs are followed by brightness alone"
 #: Raster that stands for unused entropy.
 _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
 
@@ -140,7 +142,10 @@ class LineDetector(LineParameters):
         corners = box_corners(found.final)
         x, y = found.grid.to_world(corners[..., 1], corners[..., 0])
         rectangles = np.stack([x, y], axis=-1)
-        return Footprints.from_rectangles(rectangles, crs=scene.crs, metadata=found.counts(), source=self.name)
+        record: dict[str, Any] = dict(found.counts())
+        if scene.image is not None and not scene.image.is_colour and "nir" not in scene.image.bands:
+            record["notes"] = [_GREY]
+        return Footprints.from_rectangles(rectangles, crs=scene.crs, metadata=record, source=self.name)
 
     def measured(self, scene: Scene) -> Mapping[str, float]:
         """Return the pulse spacing, unless it is given."""
@@ -156,6 +161,7 @@ class LineDetector(LineParameters):
         points, image = scene.points, scene.image
         assert points is not None
         assert image is not None
+        image = image.in_colour()
         grid = image.grid
         tile_side = self.ground_tile * (PAPER_PIXEL if self.tile_pixel == "printed" else grid.gsd)
         spacing = self.spacing or pulse_spacing(points, grid)

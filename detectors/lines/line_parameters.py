@@ -28,7 +28,7 @@ class LineParameters(Detector):
     pixels (`least_strip`) and for the pixels of the tiles (`tile_pixel`): their readings hold in every mode.
     """
 
-    requires: ClassVar[tuple[str, ...]] = ("points", "colour")
+    requires: ClassVar[tuple[str, ...]] = ("points", "brightness")
     halo: ClassVar[float] = 150.0
     used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
         "below_ground": {"ground": ("point-dem",)},

@@ -168,6 +168,17 @@ class Image:
         valid = None if self.valid is None else self.valid[part]
         return Image(self.values[:, *part], self.bands, self.grid.cut(*part), valid)
 
+    def in_colour(self) -> Image:
+        """Return the image itself where it has colours, else one whose red, green and blue are its grey band."""
+        if self.is_colour:
+            return self
+        if "grey" not in self.bands:
+            raise InputError(f"the image has neither colours nor a band 'grey'; it has {', '.join(self.bands)}")
+        others = [index for index, name in enumerate(self.bands) if name == "nir"]
+        grey = self.bands.index("grey")
+        values = self.values[[grey, grey, grey, *others]]
+        return Image(values, ("red", "green", "blue", "nir")[: len(values)], self.grid, self.valid)
+
     @property
     def is_colour(self) -> bool:
         """Whether red, green and blue are all there."""

@@ -86,7 +86,7 @@ def test_a_run_that_will_be_skipped_is_foreseen_without_reading_the_scene(tmp_pa
     suite = Suite("s", scenes, (DetectorEntry(make_detector("original")),), (make_evaluator("threshold-free"),))
     with Store(tmp_path / "a.sqlite") as store:
         plan = make_plan(suite, store)
-    assert [run.skip for run in plan.runs[:-1]] == [bare.lacks(("colour",))] * (len(plan.runs) - 1)
+    assert [run.skip for run in plan.runs[:-1]] == [bare.lacks(("brightness",))] * (len(plan.runs) - 1)
     assert plan.runs[-1].skip == ""
 
 

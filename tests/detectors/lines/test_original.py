@@ -120,6 +120,26 @@ def test_a_scene_without_image_or_elevation_is_refused_with_the_reason():
     assert bare.lacks(Original.requires)
 
 
+def test_a_grey_image_is_read_as_brightness_and_said_to_be_grey():
+    scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 30)).build()
+    house = scene.reference.polygons[0] if scene.reference is not None else detect(scene).polygons[0]
+    grey = Image(scene.image.values[1:2], ("grey",), scene.image.grid)
+    found = detect(Scene("grey", scene.extent, points=scene.points, image=grey, dem=scene.dem))
+    assert len(found) == 1
+    assert found.polygons[0].intersection(house).area > 0.8 * found.polygons[0].union(house).area
+    assert "grey" in found.metadata["notes"][0]
+    assert "notes" not in detect(scene).metadata
+
+
+def test_an_image_of_infrared_alone_is_a_reason_to_skip():
+    scene = SceneBuilder().build()
+    infrared = Image(scene.image.values[:1], ("nir",), scene.image.grid)
+    bare = Scene("infrared", scene.extent, points=scene.points, image=infrared, dem=scene.dem)
+    assert "red, green and blue, or a grey one" in bare.lacks(Original.requires)
+    with pytest.raises(MissingInputError, match="grey"):
+        detect(bare)
+
+
 def test_a_16_bit_image_and_another_order_of_bands_change_nothing():
     scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 30)).build()
     values = scene.image.values[::-1].astype(np.uint16) * 257
