@@ -56,8 +56,14 @@ def test_a_cue_without_values_is_silent_and_nothing_high_silences_nothing_else()
 
 
 def test_cells_that_are_not_high_do_not_count():
-    ratings = {"penetration": rating(-0.5, -0.5), ANCHOR: rating(-0.6, 0.7)}
+    ratings = {"penetration": rating(-0.5, -0.5, noise=0.01), ANCHOR: rating(-0.6, 0.7)}
     ratings["penetration"][:, :8] = 1.0
     high = HIGH.copy()
     high[:, :8] = False
     assert informative_cues(ratings, high).used == (ANCHOR,)
+
+
+def test_penetration_is_not_tested_by_the_roughness_of_a_sparse_cloud():
+    """Roughness misleads where a window holds few points: on knox-small it contradicted penetration, and was wrong."""
+    ratings = {"penetration": rating(-0.8, 0.3), ANCHOR: rating(0.1, -0.2)}
+    assert informative_cues(ratings, HIGH).used == tuple(ratings)
