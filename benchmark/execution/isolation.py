@@ -141,9 +141,11 @@ class IsolatedProcess:
 
 
 def _search_path() -> str:
-    """Return where modules are found, without the working folder (unless roofbench lies there)."""
+    """Return where modules are found, without the working folder (unless roofbench lies there, or it is asked for)."""
     here = Path.cwd().resolve()
-    kept = [entry for entry in sys.path if entry and (Path(entry).resolve() != here or here == FOLDER.parent)]
+    asked = [Path(entry).resolve() for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    is_kept = here == FOLDER.parent or here in asked
+    kept = [entry for entry in sys.path if entry and (is_kept or Path(entry).resolve() != here)]
     return os.pathsep.join(map(os.path.abspath, kept))
 
 
