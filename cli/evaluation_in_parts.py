@@ -55,8 +55,7 @@ def evaluate_in_parts(
     it and continues from it; it is removed at the end.
     """
     from ..core.errors import InputError, UnsupportedError
-    from ..evaluators.threshold_free.evaluator import ThresholdFree
-    from ..evaluators.threshold_free.files import evaluate_files
+    from ..evaluators.in_parts import ThresholdFree, evaluate_files
     from ..reports.verdict_stream import check_streamed_output, write_verdict_stream
     from ..scenes.geodata.footprint_stream import open_stream
 

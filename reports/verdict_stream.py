@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..core.errors import OutputError
 from ..core.output import whole_file
 from ..core.plain_paths import plain_target
-from ..evaluators.threshold_free.files import FileComparison
+from ..evaluators.in_parts import FileComparison
 from ..evaluators.verdict_table import VerdictTable
 from ..scenes.geodata.crs import parse_crs
 from ..scenes.geodata.footprint_stream import FootprintStream

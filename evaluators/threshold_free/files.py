@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError, OutputError, RoofbenchError
-from ...core.package import VERSION
+from ...core.package import FOLDER, VERSION
 from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprint_stream import FootprintStream, open_stream
 from ...scenes.geodata.footprints import Footprints, Repair
@@ -148,7 +148,17 @@ def _key(streams: tuple[FootprintStream, FootprintStream], division: Division) -
         with stream.file.open("rb") as content:
             checksum = hashlib.file_digest(content, "blake2b").hexdigest()
         sides.append([checksum, stream.layer, stream.building_id, stream.crs])
-    return json.dumps({"version": VERSION, "parts": division.parts, "tile": division.tile, "sides": sides})
+    facts = {"version": VERSION, "code": _code(), "parts": division.parts, "tile": division.tile, "sides": sides}
+    return json.dumps(facts)
+
+
+def _code() -> str:
+    """Return a digest of the code that fills a work folder: parts that other code made are not continued."""
+    digest = hashlib.sha256()
+    for room in ("core", "scenes/geodata", "evaluators"):
+        for path in sorted((FOLDER / room).rglob("*.py")):
+            digest.update(path.relative_to(FOLDER).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()
 
 
 def _claim(work: Path, key: str, say: Callable[[str], None]) -> None:

@@ -1,0 +1,11 @@
+"""Evaluation of two files in parts: what the other rooms need of the evaluator that can do it.
+
+The evaluator that is the default one compares files of any size; the others need both sets as a whole.
+"""
+
+from __future__ import annotations
+
+from .threshold_free.evaluator import ThresholdFree
+from .threshold_free.files import FileComparison, evaluate_files
+
+__all__ = ["FileComparison", "ThresholdFree", "evaluate_files"]
