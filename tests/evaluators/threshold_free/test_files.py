@@ -49,7 +49,9 @@ def test_evaluation_and_layers_are_those_of_whole_files(tmp_path, batches_of_fiv
     comparison = evaluate_files(ThresholdFree(), tuple(map(open_stream, paths)), tmp_path / "work", parts=3)
     assert comparison.evaluation.counts == whole.counts
     # Overlaps within the reference are named where it is held as a whole only.
-    assert comparison.evaluation.notes == tuple(note for note in whole.notes if " pairs of references" not in note)
+    assert comparison.evaluation.notes == tuple(
+        note for note in whole.notes if " of references of different buildings" not in note
+    )
     found, expected = tmp_path / f"parts{ending}", tmp_path / f"whole{ending}"
     write_verdict_stream(comparison, found)
     write_verdicts(whole.verdicts, expected)

@@ -88,7 +88,8 @@ def test_it_is_the_evaluation_in_memory(tmp_path, in_memory, seed, matching):
     codes = sides[1].building_codes
     found, tables = in_parts(tmp_path, Division(5, 30.0), detected, reference, codes, evaluator, batch=7)
     assert found.tallies.to_dict() == expected.tallies.to_dict()
-    assert found.notes == expected.notes
+    # Overlaps within the reference are named where it is held as a whole only.
+    assert found.notes == tuple(note for note in expected.notes if " of references of different buildings" not in note)
     for one, two in zip(tables(), (expected.verdicts.detection_table, expected.verdicts.reference_table), strict=True):
         assert one.to_bytes() == two.to_bytes()
 
