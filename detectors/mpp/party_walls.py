@@ -30,7 +30,7 @@ from .arrays import Floats, Rectangles
 from .cells import HIGH
 from .rectangles import corners
 
-__all__ = ["CERTAIN", "PROBABLE", "Wall", "WallRule", "party_walls", "wall_strength"]
+__all__ = ["CERTAIN", "PROBABLE", "Wall", "WallRule", "most_walls", "party_walls", "wall_strength"]
 
 #: Metres: spacing of the lattice, narrowest house, smallest depth of a row, widest house of a row (median).
 _LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 4.5, 12.0
@@ -68,6 +68,13 @@ class Wall(NamedTuple):
 
     point: Floats
     along: Floats
+
+
+def most_walls(rectangles: Rectangles, grid: Grid) -> NDArray[np.int64]:
+    """Return how many party walls there is room for in each rectangle, shape (n,): houses have a least width."""
+    sides = np.sort(np.asarray(rectangles).reshape(-1, 5)[:, 2:4] * grid.gsd, axis=1)
+    room = np.floor(sides[:, 1] / _NARROWEST + 1e-9).astype(np.int64) - 1
+    return np.where(sides[:, 0] < _SHALLOWEST, 0, np.maximum(room, 0))
 
 
 def party_walls(

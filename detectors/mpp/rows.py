@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ...scenes.geodata.raster import Grid
 from .arrays import Rectangles
 from .buildings import block_of, outline_buildings
-from .party_walls import CERTAIN, PROBABLE, Wall, party_walls
+from .party_walls import CERTAIN, PROBABLE, Wall, most_walls, party_walls
 from .rectangles import to_world
 
 __all__ = ["Levels", "find_levels"]
@@ -95,8 +95,14 @@ def find_levels(
     grid : Grid
     """
     block = block_of(shapely.polygons(to_world(rectangles, grid)), blocks)
-    certain = np.array([len(party_walls(one, height, state, grid, CERTAIN)) for one in rectangles], dtype=np.int64)
-    walls_of_block = np.bincount(block[block >= 0], weights=certain[block >= 0], minlength=len(blocks))
+    inside = block >= 0
+    room = np.bincount(block[inside], weights=most_walls(rectangles, grid)[inside], minlength=len(blocks))
+    # Most blocks are too small for a row, whatever their roofs look like.
+    looked_at = inside & np.append(_are_rows(blocks, room), False)[block]
+    certain = np.zeros(len(rectangles), dtype=np.int64)
+    for k in np.flatnonzero(looked_at).tolist():
+        certain[k] = len(party_walls(rectangles[k], height, state, grid, CERTAIN))
+    walls_of_block = np.bincount(block[inside], weights=certain[inside], minlength=len(blocks))
     row = _are_rows(blocks, walls_of_block)
     outlines = outline_buildings(rectangles, blocks, grid)
     parts: list[Any] = []

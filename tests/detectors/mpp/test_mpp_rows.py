@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roofbench.detectors.mpp.cells import HIGH, LOW
-from roofbench.detectors.mpp.party_walls import CERTAIN, PROBABLE, party_walls, wall_strength
+from roofbench.detectors.mpp.party_walls import CERTAIN, PROBABLE, most_walls, party_walls, wall_strength
 from roofbench.detectors.mpp.rectangles import to_world
 from roofbench.detectors.mpp.rows import find_levels
 from roofbench.scenes.geodata.raster import Grid
@@ -78,6 +78,15 @@ def test_low_steps_are_probable_but_not_certain():
 )
 def test_what_is_no_row_has_no_walls(roof, sides):
     assert walls_at(roof, sides) == []
+
+
+@given(st.floats(3, 60), st.floats(3, 20), st.integers(0, 2**32 - 1))
+def test_no_more_walls_are_found_than_there_is_room_for(length, depth, seed):
+    ups = np.random.default_rng(seed).uniform(0, 4, 400)
+    sides = (10, 10, 10 + length, 10 + depth)
+    height, state = place((sides, lambda x, y: 6 + ups[np.clip((2 * x).astype(int), 0, 399)]))
+    one = rectangle(*sides)
+    assert len(party_walls(one, height, state, GRID, PROBABLE)) <= most_walls(one, GRID)[0]
 
 
 def test_walls_turn_with_the_row():
