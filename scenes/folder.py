@@ -29,6 +29,7 @@ import shapely
 
 from ..core.errors import CRSError, InputError
 from ..core.output import whole_folder
+from ..core.plain_values import plain_value
 from ..core.registry import nearest_hint
 from .geodata.crs import require_metric
 from .geodata.footprints import Footprints
@@ -212,7 +213,7 @@ def _manifest(scene: Scene, folder: Path) -> dict[str, Any]:
         manifest["files"] = files
     if facts:
         manifest["facts"] = facts
-    plain: dict[str, Any] = _plain(manifest)
+    plain: dict[str, Any] = _toml_content(manifest)
     return plain
 
 
@@ -333,17 +334,13 @@ def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
         scratch.write_text(tomli_w.dumps(manifest), encoding="utf-8")
 
 
-def _plain(value: Any) -> Any:
-    """Return what TOML can hold: numpy scalars as numbers, tuples as lists; None is left out."""
+def _toml_content(value: Any) -> Any:
+    """Return what TOML can hold: numpy scalars as numbers, tuples as lists; None and NaN are left out."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+        return {str(key): item for key, given in value.items() if (item := _toml_content(given)) is not None}
     if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(item) for item in value if item is not None]
-    if isinstance(value, np.generic):
-        return value.item()
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    return str(value)
+        return [item for given in value if (item := _toml_content(given)) is not None]
+    return plain_value(value)
 
 
 def _content_hash(folder: Path, manifest: Mapping[str, Any]) -> str:

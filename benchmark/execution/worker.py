@@ -19,6 +19,7 @@ from shapely import Geometry
 
 from ...core.errors import MissingInputError, RoofbenchError
 from ...core.memory import highest_memory, reset_highest_memory
+from ...core.plain_values import plain_value
 from ...detectors.base import Detector
 from ...detectors.checks import checked_output
 from ...detectors.external.precomputed import Precomputed
@@ -29,7 +30,7 @@ from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..identity.keys import digest, random_stream_entropy
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
-from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure, plain_value
+from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure
 from .scene_picture import scene_picture
 from .tasks import Task, TilePart
 

@@ -7,7 +7,6 @@ An *outcome* has a status (``ok``, ``failed`` or ``skipped``) with its reason, t
 from __future__ import annotations
 
 import json
-import math
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -21,7 +20,7 @@ from ...evaluators.base import Evaluation
 from ...scenes.geodata.footprints import Footprints
 from ..identity.recipes import PluginRecipe
 
-__all__ = ["Cost", "Outcome", "SceneRecord", "Score", "ScoreFailure", "Status", "footprints_of", "plain_value"]
+__all__ = ["Cost", "Outcome", "SceneRecord", "Score", "ScoreFailure", "Status", "footprints_of"]
 
 Status = Literal["ok", "failed", "skipped"]
 
@@ -100,17 +99,6 @@ class ScoreFailure:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reason", _storable(self.reason))
-
-
-def plain_value(value: Any) -> Any:
-    """Return a value as Python number, text or None; NaN becomes None."""
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, bool | int | str):
-        return value
-    if isinstance(value, float):
-        return None if math.isnan(value) else value
-    return None if value is None or type(value).__name__ == "NAType" else str(value)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -195,7 +195,7 @@ def test_plans_are_kept_once_and_the_last_one_is_resumed(store):
 
 
 def test_nan_in_attributes_is_none(tmp_path):
-    from roofbench.benchmark.store.outcomes import plain_value
+    from roofbench.core.plain_values import plain_value
 
     values = [plain_value(value) for value in (np.float32(0.5), np.int64(3), np.nan, None, "text", True)]
     assert values == [0.5, 3, None, None, "text", True]
