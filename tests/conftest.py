@@ -7,6 +7,8 @@ from harness.effort import use_profile
 
 from roofbench.benchmark.execution.tasks import Task
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
+from roofbench.detectors.registry import DETECTORS
+from roofbench.evaluators.registry import EVALUATORS
 
 use_profile()
 
@@ -17,6 +19,13 @@ def pytest_collection_modifyitems(items):
 
 
 MISBEHAVING = f"{Path(__file__).parent / 'plugins' / 'misbehaving.py'}:Misbehaving"
+
+
+@pytest.fixture(autouse=True)
+def plugins_of_this_test_only(monkeypatch):
+    """Forget the plugins that a test adds: ``-e all`` would use them in the next one."""
+    for registry in (DETECTORS, EVALUATORS):
+        monkeypatch.setattr(registry, "_added", dict(registry._added))
 
 
 @pytest.fixture

@@ -48,7 +48,8 @@ def test_list_parameters_names_every_parameter_with_its_range():
 
 
 def test_the_suite_of_the_papers_holds_every_full_preset_with_three_seeds():
-    full = {name for name in preset_names() if not name.endswith("-small")}
+    of_roofbench = {"rows", "old-town"}  # no data sets of the papers
+    full = {name for name in preset_names() if not name.endswith("-small")} - of_roofbench
     scenes = named_suite("papers").scenes
     assert {scene.place for scene in scenes} == full
     assert len(scenes) == 3 * len(full)
