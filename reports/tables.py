@@ -153,11 +153,16 @@ class Table:
         Undefined values are empty.
         """
         text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        if header:
-            writer.writerow([column.title for column in self.columns])
-        writer.writerows(self.rows)
-        return text.getvalue()
+        # With this line end the writer quotes texts that hold "\r", too; lines end in "\n" all the same.
+        writer = csv.writer(text, lineterminator="\r\n")
+        rows = [[column.title for column in self.columns], *self.rows] if header else self.rows
+        lines = []
+        for row in rows:
+            text.seek(0)
+            text.truncate()
+            writer.writerow(row)
+            lines.append(text.getvalue().removesuffix("\r\n") + "\n")
+        return "".join(lines)
 
     def to_json(self) -> str:
         """Return a JSON list with one object per row."""

@@ -5,7 +5,7 @@ import io
 import json
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from roofbench.reports.format import cell_width, interval_text, number_text, shortened
@@ -33,6 +33,7 @@ def test_a_text_line_for_the_head_the_rule_and_every_row(table):
 
 
 @given(TABLES)
+@example(table=Table.of([Column("a"), Column("b")], [[None, "\r"], ["\r\n", "x\ry"]]))
 def test_csv_is_read_back_with_what_was_in_the_cells(table):
     head, *rows = csv.reader(io.StringIO(table.to_csv(), newline=""))
     assert head == [column.title for column in table.columns]
