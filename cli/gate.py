@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,7 +17,8 @@ from .options import DetectorOption, FormatOption, IndicesOption, OverwriteOptio
 
 if TYPE_CHECKING:
     from ..benchmark.analysis.baseline import Baseline
-    from ..benchmark.suite import DetectorEntry
+    from ..benchmark.analysis.self_test import SelfTest
+    from ..benchmark.suite import DetectorEntry, Suite
 
 __all__ = ["gate"]
 
@@ -63,6 +65,17 @@ def gate(
         float,
         typer.Option("--time-margin", min=0.001, metavar="SHARE", help="Share of run time that counts as equal."),
     ] = 0.1,
+    self_test: Annotated[
+        bool,
+        typer.Option(
+            "--self-test",
+            help="Test the gate instead: run the installed code twice with different seeds, compare random deals of "
+            "these runs, and print how often identical code is called worse.",
+        ),
+    ] = False,
+    comparisons: Annotated[
+        int, typer.Option("--comparisons", min=1, metavar="N", help="Number of null comparisons of --self-test.")
+    ] = 1000,
     form: FormatOption = "table",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="Markdown file for the result.")
@@ -77,15 +90,16 @@ def gate(
     --against names. --scenes compares only matching scenes, --suite measures other scenes than the baseline's.
 
     Exit code 1 when an index became worse or a run fails that succeeded before, 4 when nothing could be measured or
-    the scenes differ, else 0.
+    the scenes differ, else 0. With --self-test 1 when identical code is called worse more often than the gate promises.
     """
     from ..benchmark.analysis.baseline import Baseline
     from ..benchmark.analysis.gate import compare, different_scenes, margins_of
     from ..benchmark.analysis.timing import time_side_by_side
     from ..benchmark.suite import suite_of_words
-    from ..core.output import check_target, whole_file
+    from ..core.output import check_target
     from ..reports.gate_json import gate_json
     from ..reports.gate_text import format_gate
+    from ..reports.self_test_text import format_self_test
 
     if output is not None:
         check_target(output, overwrite)
@@ -97,6 +111,10 @@ def gate(
     chosen_evaluator = before.evaluator.evaluator()
     indices = chosen_evaluator.gated_indices(index)
     margins = margins_of(margin or [], indices)
+    if self_test and (candidate is not None or against is not None or time):
+        raise ParameterError(
+            "self_test=True compares the installed code with itself: leave out the candidate file, against= and time="
+        )
     if candidate is not None:
         if suite is not None or detector or time:
             raise ParameterError("a candidate file is measured already: leave out suite=, detector= and time=")
@@ -113,6 +131,13 @@ def gate(
         if suite is not None:
             chosen = replace(chosen, scenes=suite_of_words([suite], None, None).scenes)
             chosen = chosen if scenes is None else chosen.with_scenes(scenes)
+        if self_test:
+            result_of_test = _self_test(
+                chosen, options, indices=indices, margins=margins, level=level, comparisons=comparisons
+            )
+            _write(output, overwrite, format_self_test(result_of_test, "md"))
+            typer.echo(format_self_test(result_of_test, form))
+            raise typer.Exit(result_of_test.exit_code)
         after, _ = measure_suite(chosen, options, messages(options.quiet))
     after = after.with_labels_of(before)
     differences = different_scenes(before, after)
@@ -122,11 +147,34 @@ def gate(
         raise typer.Exit(4)
     extra = time_side_by_side(before, after, margin=time_margin, level=level) if time else []
     result = compare(before, after, indices=indices, margins=margins, level=level, extra=extra)
-    if output is not None:
-        with whole_file(output, overwrite=overwrite) as scratch:
-            scratch.write_text(format_gate(result, "md") + "\n", encoding="utf-8")
+    _write(output, overwrite, format_gate(result, "md"))
     typer.echo(gate_json(result) if form == "json" else format_gate(result, form))
     raise typer.Exit(result.exit_code)
+
+
+def _write(path: Path | None, overwrite: bool, text: str) -> None:
+    from ..core.output import whole_file
+
+    if path is not None:
+        with whole_file(path, overwrite=overwrite) as scratch:
+            scratch.write_text(text + "\n", encoding="utf-8")
+
+
+def _self_test(suite: Suite, options: RunOptions, **how: Any) -> SelfTest:
+    """Measure a suite twice with different seeds, the second time without stored results, and test the gate on it."""
+    from ..benchmark.analysis.self_test import self_test
+    from ..benchmark.suite import DetectorEntry
+
+    console = messages(options.quiet)
+    first, _ = measure_suite(suite, options, console)
+    fresh = tuple(
+        DetectorEntry(entry.detector, tuple(max(entry.seeds) + 1 + number for number in range(len(entry.seeds))))
+        for entry in suite.detectors
+    )
+    with tempfile.TemporaryDirectory(prefix="roofbench-") as folder:
+        apart = replace(options, store=Path(folder) / "self-test.sqlite")
+        second, _ = measure_suite(replace(suite, detectors=fresh), apart, console)
+    return self_test(first, second, **how)
 
 
 def _named(before: Baseline, selections: list[str]) -> tuple[Baseline, tuple[DetectorEntry, ...]]:

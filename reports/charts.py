@@ -13,25 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from ..benchmark.analysis.inference import wilson_interval
 from ..benchmark.analysis.report_data import CostPoint, SizeBin, SizeCurve
 from .format import shortened
 from .inline_svg import FAINT, INK, SERIES, new_figure, style_axes
 
-__all__ = ["cost_figure", "legend_below", "size_figure", "wilson"]
-
-_Z = 1.959963984540054  # two-sided 95 %
-
-
-def wilson(right: int, count: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a share.
-
-    >>> tuple(round(bound, 3) for bound in wilson(9, 10))
-    (0.596, 0.982)
-    """
-    share, spread = right / count, _Z**2 / count
-    middle = (share + spread / 2) / (1 + spread)
-    half = _Z / (1 + spread) * math.sqrt(share * (1 - share) / count + spread / (4 * count))
-    return max(0.0, middle - half), min(1.0, middle + half)
+__all__ = ["cost_figure", "legend_below", "size_figure"]
 
 
 def size_figure(curves: Sequence[SizeCurve]) -> Figure:
@@ -60,7 +47,7 @@ def _draw_size(axes: Axes, bins: Sequence[SizeBin], label: str, place: int, coun
     shown = [(number + offset, each) for number, each in enumerate(bins) if each.count]
     x = [position for position, _ in shown]
     y = [100 * each.right / each.count for _, each in shown]
-    bounds = [wilson(each.right, each.count) for _, each in shown]
+    bounds = [wilson_interval(each.right, each.count) for _, each in shown]
     axes.vlines(
         x, [100 * low for low, _ in bounds], [100 * high for _, high in bounds], color=colour, linewidth=1.3, alpha=0.6
     )

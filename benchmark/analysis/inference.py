@@ -8,7 +8,8 @@ Sources
 Hesterberg 2015, What Teachers Should Know About the Bootstrap, The American Statistician 69(4): the expanded
 percentile interval. Holm 1979, A Simple Sequentially Rejective Multiple Test Procedure, Scandinavian Journal of
 Statistics 6. Piepho 2004, An Algorithm for a Letter-Based Representation of All-Pairwise Comparisons, Journal of
-Computational and Graphical Statistics 13.
+Computational and Graphical Statistics 13. Wilson 1927, Probable Inference, Journal of the American Statistical
+Association 22.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ __all__ = [
     "paired_p",
     "scenes_needed",
     "sign_flip_p",
+    "wilson_interval",
 ]
 
 LEVEL = 0.05
@@ -42,6 +44,7 @@ HALF_SPLITS = 50
 
 _MOST_ENUMERATED = 16  # 2^16 sign patterns
 _LATTICE = 4096  # steps between zero and the largest difference
+_Z = 1.959963984540054  # two-sided 95 %
 
 
 def bootstrap_interval(values: ArrayLike, *, level: float = LEVEL) -> tuple[float, float] | None:
@@ -149,6 +152,22 @@ def holm(p_values: Sequence[float]) -> list[float]:
         reached = min(1.0, max(reached, (len(p_values) - place) * p_values[i]))
         adjusted[i] = reached
     return adjusted
+
+
+def wilson_interval(found: int, count: int) -> tuple[float, float]:
+    """Return Wilson's 95 % interval of a share: `found` of `count`.
+
+    Examples
+    --------
+    >>> tuple(round(bound, 3) for bound in wilson_interval(9, 10))
+    (0.596, 0.982)
+    >>> tuple(round(bound, 4) for bound in wilson_interval(0, 1000))
+    (0.0, 0.0038)
+    """
+    share, spread = found / count, _Z**2 / count
+    middle = (share + spread / 2) / (1 + spread)
+    half = _Z / (1 + spread) * math.sqrt(share * (1 - share) / count + spread / (4 * count))
+    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def first_places(values: ArrayLike, splits: int = HALF_SPLITS) -> NDArray[np.int64]:

@@ -260,6 +260,19 @@ def test_the_command_line_exits_0_1_and_4(cli, misbehaving, tmp_path):
     assert "Not comparable: scene hamlet-6 is only in the baseline" in other.stderr
 
 
+def test_the_self_test_prints_how_often_identical_code_is_called_worse(cli, misbehaving, tmp_path):
+    (tmp_path / "little.toml").write_text(suite_text(misbehaving, 10))
+    assert cli("baseline", "save", "-o", "b.json", "--suite", "little.toml", "-j", 0).exit_code == 0
+    words = ["gate", "b.json", "-j", 0, "--self-test", "--comparisons", 7]
+    result = cli(*words, "--format", "json", "-o", "rates.md")
+    assert result.exit_code == 0, result.output
+    rows = json.loads(result.stdout)["rows"]
+    assert {(row["comparisons"], row["alarms"], row["runs_differ"]) for row in rows} == {(7, 0, True)}
+    assert (tmp_path / "rates.md").read_text().startswith("### Self-test of the gate: passed")
+    with pytest.raises(RoofbenchError, match="leave out the candidate file, against= and time="):
+        cli(*words, "--time")
+
+
 @pytest.mark.slow
 def test_the_gate_suite_cut_to_five_scenes_is_not_measurable(cli):
     saved = cli("baseline", "save", "-o", "b.json", "-d", "ndsm", "--scenes", "knox-small-[1-5]", "-j", 0)
