@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .evaluators.uncertainty.paired import compare
     from .evaluators.uncertainty.redrawn import redraw_changes
     from .reports.board import run
+    from .reports.listings import list_detectors, list_evaluators, list_indices, list_scenes, list_suites
     from .scenes.folder import open_scene, save_scene
     from .scenes.geodata.footprints import Footprints
     from .scenes.geodata.points import PointCloud
@@ -59,6 +60,11 @@ __all__ = [
     "evaluate",
     "execution_option",
     "import_scene",
+    "list_detectors",
+    "list_evaluators",
+    "list_indices",
+    "list_scenes",
+    "list_suites",
     "make_detector",
     "make_evaluator",
     "make_scene",

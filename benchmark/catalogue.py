@@ -7,7 +7,6 @@ package, presets of the generator, and scene folders in the current directory.
 
 from __future__ import annotations
 
-import inspect
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -175,7 +174,7 @@ def _plugin_entry(name: str, *, detector: bool) -> Entry:
 
 def _described(plugin: Detector | Evaluator | type[Detector | Evaluator], *, name: str) -> Entry:
     kind = plugin if isinstance(plugin, type) else type(plugin)
-    description = inspect.cleandoc(kind.__doc__ or "")
+    description = kind.description()
     meaning = " ".join(description.partition("\n\n")[0].split())
     options, parameters = tuple(kind.execution_options().values()), tuple(kind.parameters().values())
     if not isinstance(plugin, type):

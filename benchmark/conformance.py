@@ -16,13 +16,14 @@ from ..core.errors import RoofbenchError, UnsupportedError
 from ..core.parameters import Parameterised
 from ..core.processes import Limits
 from ..detectors.base import Detector
+from ..detectors.streams import random_stream
 from ..evaluators.base import Evaluation, Evaluator
 from ..scenes.builtin import hamlet
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import NEUTRAL_NAME, Scene
 from .execution.isolation import IsolatedProcess
 from .execution.tasks import Task
-from .execution.worker import detect, random_stream
+from .execution.worker import detect
 from .identity.recipes import PluginRecipe, SceneRecipe
 from .store.outcomes import Outcome
 
@@ -154,7 +155,9 @@ def _ignores_names(detector: Detector, scene: Scene) -> str:
 def _wkb_under(name: str, detector: Detector, scene: Scene) -> list[bytes]:
     seen = scene.for_detection()
     seen.name = name
-    found: list[bytes] = shapely.to_wkb(detector.detect(seen, random_stream(0, scene, detector)).polygons).tolist()
+    found: list[bytes] = shapely.to_wkb(
+        detector.detect(seen, random_stream(0, scene.name, detector.name)).polygons
+    ).tolist()
     return found
 
 

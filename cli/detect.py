@@ -148,13 +148,13 @@ def _refuse_without_tiles(halo: float | None, scheduler: str | None, jobs: int) 
 
 
 def _write_steps(detector: Detector, scene: Scene, seed: int, folder: Path, overwrite: bool) -> int:
-    from ..benchmark.execution.worker import random_stream
+    from ..detectors.streams import random_stream
     from ..reports.steps.step_folder import write_steps
 
     scene.require(detector.requires)
     visible = scene.for_detection()
     with _failures_reported(detector, scene):
-        steps = detector.steps(visible, random_stream(seed, scene, detector))
+        steps = detector.steps(visible, random_stream(seed, scene.name, detector.name))
         return write_steps(steps, folder, title=f"{detector.name} on {scene.name}", overwrite=overwrite)
 
 

@@ -18,6 +18,7 @@ replace those of the fields. A parameter that is given beside the mode overrides
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
 import numbers
 import types
@@ -217,6 +218,13 @@ class Parameterised:
     modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {}
 
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        # Before the decorator of dataclasses, which keeps what a class has.
+        if "__repr__" not in cls.__dict__:
+            cls.__repr__ = Parameterised.__repr__  # type: ignore[method-assign]
+        cls.__doc__ = _DocumentedParameters(cls.__dict__.get("__doc__") or "")  # type: ignore[assignment]
+
     def __new__(cls, *_: Any, **given: Any) -> Self:
         """Note which parameters are given: a mode sets the others."""
         created = super().__new__(cls)
@@ -236,6 +244,21 @@ class Parameterised:
         defaults = self.defaults() if self.used_with else {}
         for name in self.unused():
             object.__setattr__(self, name, self.parameters()[name].check(defaults[name], owner))
+
+    def __repr__(self) -> str:
+        """Return the class with the values that differ from their default: ``NDSM(height=3.0)``."""
+        given = {**self.changed(), **self._changed_options()}
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
+
+    def _changed_options(self) -> dict[str, Any]:
+        options = self.execution_options()
+        return {name: value for name, value in self.execution_values().items() if value != options[name].default}
+
+    @classmethod
+    def description(cls) -> str:
+        """Return its docstring without the list of parameters that `help` shows."""
+        documented = cls.__dict__.get("__doc__")
+        return inspect.cleandoc(documented.text if isinstance(documented, _DocumentedParameters) else documented or "")
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
@@ -305,6 +328,29 @@ class Parameterised:
                 raise ParameterError(f"{owner}: {name} has no effect here: it is used with {needed}")
         return copy
 
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Return every parameter and execution option by name, as scikit-learn's estimators do.
+
+        `deep` changes nothing: no parameter is an object with parameters of its own.
+        """
+        return {**self.values(), **self.execution_values()}
+
+    def set_params(self, **values: Any) -> Self:
+        """Change parameters in place and return the object, as scikit-learn's estimators do.
+
+        `replaced` returns a changed copy instead. As with any key of a mapping, do not change an object that is used
+        as one.
+
+        Raises
+        ------
+        ParameterError
+            Unknown parameter, or a value outside its range; nothing is changed then.
+        """
+        changed = self.replaced(values)
+        self.__dict__.clear()  # what was derived from the old values goes as well
+        self.__dict__.update(changed.__dict__)
+        return self
+
     def unused(self) -> list[str]:
         """Return the names of the parameters that have no effect beside the values of others."""
         return [
@@ -328,6 +374,33 @@ class Parameterised:
         """
         defaults = self.defaults()
         return {name: value for name, value in self.values().items() if value != defaults[name]}
+
+
+class _DocumentedParameters:
+    """Docstring of a class, followed by its parameters with unit, range and source; written when it is read."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __get__(self, instance: Any, owner: type[Parameterised]) -> str:
+        if "__dataclass_params__" not in owner.__dict__:
+            return self.text  # the class is being made
+        sections = [inspect.cleandoc(self.text)]
+        titles = {"Parameters": owner.parameters(), "Execution options": owner.execution_options()}
+        for title, rules in titles.items():
+            if rules:
+                sections.append("\n".join([title, "-" * len(title), *map(_documented, rules.values())]))
+        return "\n\n".join(filter(None, sections))
+
+
+def _documented(rule: Parameter) -> str:
+    """Return a parameter in the form of numpydoc."""
+    kind = rule.type.__name__ + (" or None" if rule.optional else "")
+    lines = [f"{rule.name} : {kind}, default {rule.default!r}"]
+    lines += [f"    {rule.doc[:1].upper()}{rule.doc[1:]}."] if rule.doc else []
+    lines.append(f"    {rule.range_text[:1].upper()}{rule.range_text[1:]}.")
+    lines += [f"    Source: {rule.source}."] if rule.source else []
+    return "\n".join(lines)
 
 
 def _plain_type(hint: Any) -> tuple[type, bool]:

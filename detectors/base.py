@@ -9,9 +9,10 @@ any number of workers.
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
-from typing import ClassVar
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..core.parameters import Parameterised
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
 from .steps import Step
+from .streams import random_stream
 
 __all__ = ["Detector"]
 
@@ -51,9 +53,23 @@ class Detector(Parameterised, ABC):
     numbers: ClassVar[tuple[str, ...]] = ()
     place_streams: ClassVar[bool] = False
 
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        for name in ("detect", "steps"):
+            if name in cls.__dict__:
+                setattr(cls, name, _with_default_stream(cls.__dict__[name]))
+
     @abstractmethod
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
-        """Return the footprints of the buildings in a scene; none is a valid result."""
+        """Return the footprints of the buildings in a scene; none is a valid result.
+
+        Parameters
+        ----------
+        scene : Scene
+        rng : numpy.random.Generator
+            Every random number comes from it. Callers may leave it out: a detector is then given the stream of seed 0,
+            as `roofbench.detect` uses it.
+        """
 
     def measured(self, scene: Scene) -> Mapping[str, float]:
         """Return parameters that are unset and that `detect` would measure on this scene, such as a cell size.
@@ -79,3 +95,13 @@ class Detector(Parameterised, ABC):
         ``roofbench detect --steps`` draws them.
         """
         raise UnsupportedError(f"the detector {self.name!r} shows no intermediate steps")
+
+
+def _with_default_stream(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Return `Detector.detect` or `Detector.steps` as it is called without ``rng``: with the stream of seed 0."""
+
+    @functools.wraps(method)
+    def called(self: Detector, scene: Scene, rng: np.random.Generator | None = None) -> Any:
+        return method(self, scene, random_stream(0, scene.name, self.name) if rng is None else rng)
+
+    return called

@@ -27,8 +27,17 @@ DETECTORS = Registry(
 )
 
 
-def make_detector(selection: str | Detector, parameters: Mapping[str, Any] | None = None) -> Detector:
-    """Return a detector by name, by ``name[parameter=value]`` or by ``file.py:Class``; an instance passes through.
+def make_detector(selection: str | Detector, parameters: Mapping[str, Any] | None = None, /, **values: Any) -> Detector:
+    """Return a detector by name, by ``name[parameter=value]`` or by ``file.py:Class``, with parameters.
+
+    Parameters
+    ----------
+    selection : str or Detector
+        A detector passes through, with changed parameters where some are given.
+    parameters : mapping, optional
+        Parameters by name; texts are read as on the command line.
+    **values
+        Parameters by name as well: ``make_detector("ndsm", height=3)``.
 
     Raises
     ------
@@ -37,8 +46,9 @@ def make_detector(selection: str | Detector, parameters: Mapping[str, Any] | Non
     ParameterError
         Unknown parameter or value outside its range.
     """
+    chosen = {**(parameters or {}), **values}
     if isinstance(selection, Detector):
-        return selection
-    name, values = parse_selection(selection)
-    detector: Detector = DETECTORS.get(name).build({**values, **(parameters or {})})
+        return selection.replaced(chosen) if chosen else selection
+    name, selected = parse_selection(selection)
+    detector: Detector = DETECTORS.get(name).build({**selected, **chosen})
     return detector

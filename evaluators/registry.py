@@ -33,15 +33,25 @@ EVALUATORS = Registry(
 )
 
 
-def make_evaluator(selection: str | Evaluator | None = None, parameters: Mapping[str, Any] | None = None) -> Evaluator:
-    """Return an evaluator by name, by ``name[parameter=value]`` or by ``file.py:Class``.
+def make_evaluator(
+    selection: str | Evaluator | None = None, parameters: Mapping[str, Any] | None = None, /, **values: Any
+) -> Evaluator:
+    """Return an evaluator by name, by ``name[parameter=value]`` or by ``file.py:Class``, with parameters.
 
-    An evaluator passes through; None stands for the `DEFAULT` one.
+    Parameters
+    ----------
+    selection : str or Evaluator, optional
+        An evaluator passes through, with changed parameters where some are given; None stands for the `DEFAULT` one.
+    parameters : mapping, optional
+        Parameters by name; texts are read as on the command line.
+    **values
+        Parameters by name as well: ``make_evaluator("threshold-free", matching="overlap")``.
     """
+    chosen = {**(parameters or {}), **values}
     if isinstance(selection, Evaluator):
-        return selection
-    name, values = parse_selection(selection or DEFAULT)
-    evaluator: Evaluator = EVALUATORS.get(name).build({**values, **(parameters or {})})
+        return selection.replaced(chosen) if chosen else selection
+    name, selected = parse_selection(selection or DEFAULT)
+    evaluator: Evaluator = EVALUATORS.get(name).build({**selected, **chosen})
     return evaluator
 
 

@@ -29,10 +29,7 @@ class Board(Leaderboard):
 
     def to_frame(self) -> pd.DataFrame:
         """Return the table as a DataFrame: fractions 0..1, one row per entry, columns as in the CSV file."""
-        import pandas as pd
-
-        table = leaderboard_data(self)
-        return pd.DataFrame(table.rows, columns=[column.title for column in table.columns])
+        return leaderboard_data(self).to_frame()
 
     def to_csv(self) -> str:
         """Return CSV: fractions 0..1, metres; beside each index its number of scenes and its interval."""

@@ -11,9 +11,12 @@ import io
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from .format import cell_width, one_line, shortened
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["Column", "Table", "escaped_markdown"]
 
@@ -172,6 +175,12 @@ class Table:
         """Return one mapping of column title to value per row."""
         titles = [column.title for column in self.columns]
         return [dict(zip(titles, row, strict=True)) for row in self.rows]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a pandas data frame with a column for each column."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows, columns=[column.title for column in self.columns])
 
     def to_html(self) -> str:
         """Return an HTML table for notebooks; everything in it is escaped."""

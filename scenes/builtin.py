@@ -61,7 +61,7 @@ class _House:
         return np.where(inside, self.eaves + rise, 0.0)
 
 
-def hamlet(seed: int = 0) -> Scene:
+def hamlet(seed: int = 1) -> Scene:
     """Return the built-in scene; the same seed gives the same scene.
 
     Examples

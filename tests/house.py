@@ -36,7 +36,13 @@ UNITS = {
         ("*",),
         ("uncertainty",),
     ),
-    "detectors": (("steps",), ("base",), ("shared",), ("*",), ("ndsm", "lines", "mpp", "dempster_shafer", "external")),
+    "detectors": (
+        ("steps", "streams"),
+        ("base",),
+        ("shared",),
+        ("*",),
+        ("ndsm", "lines", "mpp", "dempster_shafer", "external"),
+    ),
     "benchmark": (("identity",), ("store",), ("suite",), ("plan",), ("execution",), ("analysis",), ("*",)),
     "reports": (("*",), ("steps",)),
 }

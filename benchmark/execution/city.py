@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ...core.digests import digest
 from ...core.errors import OutputError, ParameterError
 from ...core.output import check_target, whole_file
 from ...detectors.base import Detector
@@ -29,7 +30,7 @@ from ...detectors.tiling import Measured, Seams, Tile, join_tiles, measure, tile
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.vector_files import output_driver, write_footprints
 from ...scenes.scene import Scene
-from ..identity.keys import digest, module_closure
+from ..identity.keys import module_closure
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
 from ..store.outcomes import Outcome
 from .executors import slots_of

@@ -23,18 +23,18 @@ from ...core.plain_values import plain_value
 from ...detectors.base import Detector
 from ...detectors.checks import checked_output
 from ...detectors.external.precomputed import Precomputed
+from ...detectors.streams import random_stream
 from ...detectors.tiling import owned, stream_of
 from ...evaluators.base import Evaluator
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
-from ..identity.keys import digest, random_stream_entropy
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
 from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure
 from .scene_picture import scene_picture
 from .tasks import Task, TilePart
 
-__all__ = ["detect", "execute", "execute_text", "machine_facts", "processor_time", "random_stream", "score"]
+__all__ = ["detect", "execute", "execute_text", "machine_facts", "processor_time", "score"]
 
 #: The scenes opened last; consecutive tasks of a plan often use the same scene.
 _scenes: OrderedDict[str, Scene] = OrderedDict()
@@ -51,22 +51,12 @@ def detect(scene: Scene, detector: Detector, *, seed: int = 0, stream: np.random
     if type(detector) is Precomputed:  # no subclass: a plugin must not learn the name
         found = detector.footprints_of(scene.name, visible)
     else:
-        found = detector.detect(visible, random_stream(seed, scene, detector) if stream is None else stream)
+        rng = random_stream(seed, scene.name, detector.name) if stream is None else stream
+        found = detector.detect(visible, rng)
     found = checked_output(found, scene, detector.name)
     # What was estimated for lack of a DEM goes where the footprints go: to the screen, the store, the caller.
     notes = [*found.metadata.get("notes", ()), *visible.notes]
     return dataclasses.replace(found, metadata={**found.metadata, **({"notes": notes} if notes else {})})
-
-
-def random_stream(seed: int, scene: Scene, detector: Detector) -> np.random.Generator:
-    """Return the generator from which a detector draws on a scene.
-
-    Its state follows from the scene's name, but its seed sequence is another one, from which that cannot be read.
-    """
-    entropy = random_stream_entropy(seed, scene.name, detector.name)
-    bits = np.random.PCG64(int(digest(["spawned", *entropy])[:32], 16))
-    bits.state = np.random.PCG64(np.random.SeedSequence(entropy)).state
-    return np.random.Generator(bits)
 
 
 def execute_text(task: str, detected: Callable[[bytes], None] | None = None) -> bytes:

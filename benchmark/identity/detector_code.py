@@ -16,10 +16,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+from ...core.digests import digest
 from ...core.errors import InputError
 from ...core.package import NAME
 from ...detectors.base import Detector
-from .keys import digest, module_file, source_closure
+from .keys import module_file, source_closure
 
 __all__ = ["DetectorCode"]
 

@@ -17,7 +17,6 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import inspect
-import json
 import platform
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -26,35 +25,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ...core.digests import digest
 from ...core.package import FOLDER, HOMES, NAME
 
 __all__ = [
     "SourceClosure",
-    "canonical",
-    "digest",
     "module_closure",
     "module_file",
-    "random_stream_entropy",
     "source_closure",
 ]
-
-
-def canonical(value: Any) -> str:
-    """Return JSON that is the same for equal values: sorted keys, no spaces."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-
-
-def digest(value: Any) -> str:
-    """Return the SHA-256 of a value that JSON can hold, as 64 hexadecimal digits."""
-    return hashlib.sha256(canonical(value).encode()).hexdigest()
-
-
-def random_stream_entropy(seed: int, scene: str, detector: str) -> list[int]:
-    """Return the entropy of a task's random stream; it follows from seed, scene and detector, never from the order.
-
-    Parameters are left out on purpose: a sweep compares their values under common random numbers.
-    """
-    return [seed, *(int(digest(text)[:16], 16) for text in (scene, detector))]
 
 
 @dataclass(frozen=True)
@@ -240,7 +219,8 @@ def _digest_without_file(plugin: type[Any]) -> str:
     try:
         return digest(inspect.getsource(plugin))
     except (OSError, TypeError):
-        codes = [value.__code__.co_code.hex() for value in vars(plugin).values() if inspect.isfunction(value)]
+        functions = [inspect.unwrap(value) for value in vars(plugin).values() if inspect.isfunction(value)]
+        codes = [function.__code__.co_code.hex() for function in functions]
         return digest(codes)
 
 

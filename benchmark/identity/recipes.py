@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, Self, cast
 
+from ...core.digests import digest
 from ...core.errors import ParameterError, UnknownNameError, UnsupportedError
 from ...core.parameters import parameter_text
 from ...core.registry import Registry, nearest_hint
@@ -28,7 +29,7 @@ from ...scenes.shipped import shipped_folder, shipped_names
 from ...scenes.synthetic import make_scene
 from ...scenes.synthetic.presets import preset
 from ...scenes.synthetic.presets import preset_names as generator_presets
-from .keys import digest, module_closure, source_closure
+from .keys import module_closure, source_closure
 from .spool import read_spooled
 
 __all__ = ["PluginRecipe", "SceneRecipe", "code_digest", "fingerprint_on", "label_of", "preset_names"]

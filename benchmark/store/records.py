@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 
 import shapely
 
+from ...core.digests import digest
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
-from ..identity.keys import SourceClosure, digest
+from ..identity.keys import SourceClosure
 from ..identity.recipes import PluginRecipe, SceneRecipe
 from .outcomes import Status
 

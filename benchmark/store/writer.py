@@ -14,9 +14,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from ...core.digests import canonical
 from ...core.errors import OutputError
 from ...evaluators.verdict_table import SIDES
-from ..identity.keys import SourceClosure, canonical
+from ..identity.keys import SourceClosure
 from ..identity.recipes import SceneRecipe
 from .database import connect
 from .outcomes import Outcome, SceneRecord, Score, ScoreFailure

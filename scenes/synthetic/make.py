@@ -6,6 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ParameterError
+from ..builtin import hamlet
 from ..scene import Scene
 from .presets import preset
 from .recipe import SceneParameters
@@ -24,7 +25,7 @@ GENERATOR = 5
 ORIGIN = (320000.0, 5810000.0)
 
 
-def make_scene(preset_name: str, *, seed: int = 0, **parameters: Any) -> Scene:
+def make_scene(preset_name: str, *, seed: int = 1, **parameters: Any) -> Scene:
     """Return a synthetic scene: the same for the same preset, seed and parameters, bit for bit.
 
     Points, image, DEM and reference are each made when first asked for.
@@ -32,9 +33,10 @@ def make_scene(preset_name: str, *, seed: int = 0, **parameters: Any) -> Scene:
     Parameters
     ----------
     preset_name : str
-        ``"fairfield"``, ``"knox-small"``, ...; see `preset_names`.
+        ``"fairfield"``, ``"knox-small"``, ...; see `preset_names`. ``"hamlet"`` is the built-in scene, without
+        parameters.
     seed : int
-        0 or more.
+        Counts from 1, as in suites and on the command line.
     **parameters
         Any of `SceneParameters`, instead of the preset's values.
 
@@ -44,6 +46,8 @@ def make_scene(preset_name: str, *, seed: int = 0, **parameters: Any) -> Scene:
     >>> len(scene.reference)
     12
     """
+    if preset_name == "hamlet" and not parameters:
+        return hamlet(seed)
     recipe = preset(preset_name, **parameters)
     axes = ",".join(f"{key}={getattr(recipe, key)}" for key in parameters)
     name = f"{preset_name}-{seed}" + (f"[{axes}]" if axes else "")

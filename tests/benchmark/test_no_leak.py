@@ -11,11 +11,11 @@ from harness.command_line import roofbench
 
 import roofbench as rb
 from roofbench.benchmark.conformance import check_detector
-from roofbench.benchmark.execution.worker import random_stream
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.identity.spool import read_spooled, spool
 from roofbench.benchmark.store.writer import Store
 from roofbench.detectors.registry import make_detector
+from roofbench.detectors.streams import random_stream, random_stream_entropy
 from roofbench.scenes.builtin import hamlet
 
 PLUGINS = Path(__file__).parents[1] / "plugins"
@@ -88,12 +88,13 @@ def test_the_walk_finds_what_is_hidden():
 def test_a_random_stream_is_that_of_the_name_and_does_not_show_it():
     scene, detector = hamlet(3), make_detector("mpp")
     other = rb.Scene("hamlet-4", scene.extent)
-    first, again, different = (random_stream(0, place, detector) for place in (scene, scene, other))
+    first, again, different = (random_stream(0, place.name, detector.name) for place in (scene, scene, other))
     assert first.random() == again.random() != different.random()
-    from roofbench.benchmark.identity.keys import random_stream_entropy
-
     entropy = random_stream_entropy(0, "hamlet-3", "mpp")
-    assert np.random.default_rng(np.random.SeedSequence(entropy)).random() == random_stream(0, scene, detector).random()
+    assert (
+        np.random.default_rng(np.random.SeedSequence(entropy)).random()
+        == random_stream(0, scene.name, detector.name).random()
+    )
     assert first.bit_generator.seed_seq.entropy not in (entropy, *entropy)
 
 

@@ -1,6 +1,7 @@
 """Parameters decide the result; execution options change the time alone, and no identity depends on them."""
 
 import copy
+import inspect
 import pickle
 from dataclasses import dataclass, fields
 from typing import ClassVar
@@ -113,3 +114,38 @@ def test_a_parameter_without_effect_makes_no_other_object():
 def test_a_sweep_over_a_parameter_without_effect_is_refused():
     with pytest.raises(ParameterError, match="voter: majority has no effect here: it is used with voting=True"):
         Voter(voting=False).replaced({"majority": 0.7})
+
+
+def test_the_repr_shows_what_differs_from_the_defaults():
+    assert repr(Threshold()) == "Threshold()"
+    assert repr(Threshold(height=3, threads=2)) == "Threshold(height=3.0, threads=2)"
+    assert repr(Reading(mode="paper")) == "Reading(mode='paper')"
+
+
+def test_parameters_are_read_and_changed_as_in_scikit_learn():
+    one = Threshold(threads=3)
+    assert one.get_params() == one.get_params(deep=False) == {"height": 2.5, "threads": 3}
+    assert type(one)(**one.get_params()) == one
+    assert one.set_params(height=4) is one
+    assert (one.height, one.threads) == (4.0, 3)
+    with pytest.raises(ParameterError, match=r"did you mean 'height'"):
+        one.set_params(heigth=5)
+    with pytest.raises(ParameterError, match="at least 0"):
+        one.set_params(threads=5, height=-1)
+    assert (one.height, one.threads) == (4.0, 3)
+    assert Reading().set_params(mode="paper").share == 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Described(Threshold):
+    """Everything high is a building."""
+
+    cell: float | None = parameter(None, unit="m", minimum=0.1, doc="cell size", source="our reading")
+
+
+def test_help_lists_the_parameters_below_the_docstring():
+    text = inspect.getdoc(Described)
+    assert text.startswith("Everything high is a building.\n\nParameters\n----------\nheight : float, default 2.5\n")
+    assert "cell : float or None, default None\n    Cell size.\n    At least 0.1 m.\n    Source: our reading." in text
+    assert text.endswith("-----------------\nthreads : int, default 1\n    Number of threads.\n    At least 1.")
+    assert Described.description() == "Everything high is a building."

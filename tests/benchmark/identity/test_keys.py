@@ -4,7 +4,8 @@ import sys
 import pytest
 
 from roofbench.benchmark.identity import keys
-from roofbench.benchmark.identity.keys import random_stream_entropy, source_closure
+from roofbench.benchmark.identity.keys import source_closure
+from roofbench.detectors.streams import random_stream_entropy
 from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
 
 

@@ -1,8 +1,9 @@
 """Names of scenes in tables and plots: no two scenes share one, and no scene has that of a preset."""
 
 import roofbench as rb
-from roofbench.benchmark.identity.keys import digest, module_closure
+from roofbench.benchmark.identity.keys import module_closure
 from roofbench.benchmark.identity.recipes import SceneRecipe, preset_names
+from roofbench.core.digests import digest
 from roofbench.scenes.synthetic.presets import preset
 
 

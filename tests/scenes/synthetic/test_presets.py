@@ -145,3 +145,9 @@ def test_a_height_threshold_by_tiles_fails_on_the_slopes_of_knox_alone(name, lea
     bare = cloud.classification == 2
     above = float(np.mean(cloud.z[bare] > level[number[bare]] + 2.5))
     assert least <= above <= most
+
+
+def test_seeds_count_from_one_and_the_built_in_scene_is_made_by_the_same_name():
+    assert rb.make_scene("knox-small").name == "knox-small-1"
+    assert rb.make_scene("hamlet").name == "hamlet-1"
+    assert rb.make_scene("hamlet", seed=2).content_hash != rb.make_scene("hamlet").content_hash
