@@ -18,7 +18,7 @@ from ..core.plain_paths import plain_target
 from ..evaluators.in_parts import FileComparison
 from ..evaluators.verdict_table import VerdictTable
 from ..scenes.geodata.crs import parse_crs
-from ..scenes.geodata.footprint_stream import FootprintStream
+from ..scenes.geodata.footprint_stream import FootprintStream, wkb_buffers
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.geodata.vector_files import output_driver
 from ..scenes.geodata.wkb import geometries_of_wkb
@@ -119,7 +119,7 @@ def _rows(
             "partner": pyarrow.array(partner, mask=partner < 0),
             "reason": pyarrow.array(table.reasons[part], pyarrow.string()),
             "side": pyarrow.repeat(side, end - begin),
-            "geometry": pyarrow.array(_outlines(stream, batch, ids - first, first, repaired), pyarrow.binary()),
+            "geometry": _outlines(stream, batch, ids - first, first, repaired),
         }
         for name, values in table.measures.items():
             columns[name] = pyarrow.array(values[part], mask=np.isnan(values[part]))
@@ -134,18 +134,25 @@ def _rows(
 
 def _outlines(
     stream: FootprintStream, batch: Any, rows: NDArray[np.int64], first: int, repaired: frozenset[int]
-) -> NDArray[np.object_]:
+) -> Any:
     """Return the WKB of outlines as they were evaluated: repaired, without Z."""
-    wkb = stream.wkb(batch)[rows]
-    # Bytes 1 to 4 of WKB are the type, 3 of a plain polygon, in little-endian order.
-    plain = np.fromiter((text[:5] == b"\x01\x03\x00\x00\x00" for text in wkb), dtype=bool, count=len(wkb))
+    import pyarrow
+
+    column = stream.wkb(batch)
+    if len(rows) < len(column):
+        column = column.take(pyarrow.array(rows))
+    offsets, data = wkb_buffers(column)
+    # Bytes 0 to 4 of WKB are the order of bytes and the type, 3 of a plain polygon.
+    plain = (data[offsets[:-1, None] + np.arange(5)] == (1, 3, 0, 0, 0)).all(axis=1)
     if repaired:
-        plain &= np.fromiter((first + row not in repaired for row in rows.tolist()), dtype=bool, count=len(rows))
+        plain &= ~np.isin(rows + first, list(repaired))
     others = np.flatnonzero(~plain)
-    if len(others):
-        geometries, _ = geometries_of_wkb(wkb[others], stream.file)
-        wkb[others] = shapely.to_wkb(Footprints.of(geometries).polygons, flavor="iso")
-    return wkb
+    if not len(others):
+        return column.cast(pyarrow.binary())
+    wkb = column.to_numpy(zero_copy_only=False).copy()
+    geometries, _ = geometries_of_wkb(wkb[others], stream.file)
+    wkb[others] = shapely.to_wkb(Footprints.of(geometries).polygons, flavor="iso")
+    return pyarrow.array(wkb, pyarrow.binary())
 
 
 def _write_parquet(batches: Iterator[Any], schema: Any, file: Path, crs: str | None) -> None:

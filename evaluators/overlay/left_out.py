@@ -26,6 +26,7 @@ __all__ = [
     "Counted",
     "LeftOut",
     "Measured",
+    "Objects",
     "clipped",
     "counted_detections",
     "counted_references",
@@ -53,6 +54,18 @@ class Measured(Protocol):
         """Centre of each object, m, shape (n, 2)."""
 
     def __len__(self) -> int: ...
+
+
+class Objects(Measured, Protocol):
+    """Objects of buildings, each with its row in its source; `Footprints` are such."""
+
+    @property
+    def ids(self) -> NDArray[np.int64]:
+        """Row of each object in its source, shape (n,)."""
+
+    @property
+    def building_codes(self) -> NDArray[np.int64]:
+        """Building of each object, shape (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.outline_batch import OutlineBatch
 from .outline_arrays import Outlines
 
 __all__ = ["Division", "OutlineStore", "StoredObjects", "part_of_points"]
@@ -90,7 +90,7 @@ class OutlineStore:
         content: dict[str, Any] = json.loads((self.folder / _DONE).read_text(encoding="utf-8"))
         return content
 
-    def write(self, batches: Iterable[Footprints]) -> None:
+    def write(self, batches: Iterable[OutlineBatch]) -> None:
         """Write footprints, batch by batch; what an interrupted attempt left behind is removed first."""
         self.folder.mkdir(parents=True, exist_ok=True)
         for old in self.folder.iterdir():
@@ -98,8 +98,7 @@ class OutlineStore:
         filled = np.zeros(self.division.parts, dtype=np.int64)
         row = 0
         for batch in batches:
-            start, points = batch.rings
-            count = len(batch)
+            start, points, count = batch.start, batch.points, len(batch)
             outlines = Outlines.of(start, points, batch.areas)
             place, part = _touched(outlines.bounds, self.division.tile, self.division.parts)
             order = np.argsort(part, kind="stable")
@@ -118,12 +117,11 @@ class OutlineStore:
                 self._append(f"{name}.rows", row + members)
                 self._append(f"{name}.counts", counts)
                 self._append(f"{name}.points", gathered)
-            quadrilateral = np.zeros(count, dtype=bool)
-            quadrilateral[batch.quadrilaterals[0]] = True
+            centres, quadrilateral = batch.shape()
             for column, values in (
                 ("ids", batch.ids),
                 ("areas", batch.areas),
-                ("centres", batch.centres),
+                ("centres", centres),
                 ("quadrilateral", quadrilateral),
                 ("home", home.astype(np.int32)),
                 ("offset", offset),

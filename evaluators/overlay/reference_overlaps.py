@@ -11,8 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenes.geodata.footprints import Footprints
-from .left_out import in_words
+from .left_out import Objects, in_words
 from .overlaps import Overlaps
 
 __all__ = ["reference_overlap_notes"]
@@ -24,18 +23,19 @@ _COVERED = 0.999
 _NAMED = 5
 
 
-def reference_overlap_notes(reference: Footprints, within: Overlaps) -> Iterator[str]:
+def reference_overlap_notes(reference: Objects, within: Overlaps) -> Iterator[str]:
     """Yield which references of different buildings overlap, in words, the largest overlaps first.
 
     Parameters
     ----------
-    reference : Footprints
+    reference : Objects
     within : Overlaps
         Pairs of references that share area.
 
     Examples
     --------
     >>> import shapely
+    >>> from ...scenes.geodata.footprints import Footprints
     >>> from .overlaps import overlaps_within
     >>> reference = Footprints.of([shapely.box(0, 0, 9, 9), shapely.box(3, 3, 6, 6), shapely.box(8, 0, 18, 9)])
     >>> for note in reference_overlap_notes(reference, overlaps_within(reference)):

@@ -26,6 +26,7 @@ from ...core.package import FOLDER, VERSION
 from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprint_stream import FootprintStream, open_stream
 from ...scenes.geodata.footprints import Footprints, Repair
+from ...scenes.geodata.outline_batch import OutlineBatch
 from ..overlay.left_out import repair_notes
 from ..overlay.outline_store import Division, OutlineStore
 from ..verdict_table import VerdictTable
@@ -180,11 +181,11 @@ def _read_side(task: _Task) -> None:
     labels: list[Any] = []
     repairs: list[Repair] = []
 
-    def batches() -> Iterator[Footprints]:
-        for footprints, own in stream.footprints():
+    def batches() -> Iterator[OutlineBatch]:
+        for outlines, own in stream.outlines():
             labels.append(own)
-            repairs.extend(footprints.repairs)
-            yield footprints
+            repairs.extend(outlines.repairs)
+            yield outlines
 
     store.write(batches())
     codes = None if stream.building_id is None or not labels else _building_codes(labels)

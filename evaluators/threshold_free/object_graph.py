@@ -7,30 +7,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
-from ..overlay.left_out import Counted, Measured, counted_detections, counted_references
+from ..overlay.left_out import Counted, Objects, counted_detections, counted_references
 from ..overlay.overlaps import Overlaps, overlaps_between, overlaps_within
 from .correspondence import Correspondence, match
 
-__all__ = ["ObjectGraph", "Objects", "OverlapGraph", "object_graph", "overlap_graph"]
-
-
-class Objects(Measured, Protocol):
-    """What the graph asks of the footprints of one side; `Footprints` have all of it."""
-
-    @property
-    def ids(self) -> NDArray[np.int64]:
-        """Row of each object in its source, shape (n,)."""
-
-    @property
-    def building_codes(self) -> NDArray[np.int64]:
-        """Building of each object, shape (n,)."""
+__all__ = ["ObjectGraph", "OverlapGraph", "object_graph", "overlap_graph"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

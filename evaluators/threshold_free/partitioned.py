@@ -19,6 +19,7 @@ from ..overlay.left_out import LeftOut
 from ..overlay.outline_distances import PairDistances
 from ..overlay.outline_store import OutlineStore
 from ..overlay.partition import united_from_stores, whole_graph
+from ..overlay.reference_overlaps import reference_overlap_notes
 from ..verdict_table import VerdictTable
 from .counting import count_buildings, count_objects, natural_overlaps, pair_sums
 from .evaluator import ThresholdFree, ThresholdFreeEvaluation
@@ -99,6 +100,6 @@ def evaluate_stores(
         geometric=pair_sums(graph, outlines, None),
         iou=ThresholdFreeTallies().iou.filled(graph.pair_iou),
     )
-    notes = evaluator.notes_of(tallies)
+    notes = (*reference_overlap_notes(sides[1], within[1]), *evaluator.notes_of(tallies))
     evaluation = ThresholdFreeEvaluation(evaluator=evaluator, tallies=tallies, notes=notes)
     return evaluation, lambda: find_verdicts(graph, outlines.outline)

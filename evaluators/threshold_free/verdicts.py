@@ -14,9 +14,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..overlay.left_out import Objects
 from ..verdict_table import LazyReasons, Measure, VerdictKind, VerdictTable
 from .correspondence import DECIMALS
-from .object_graph import Objects, OverlapGraph
+from .object_graph import OverlapGraph
 
 __all__ = ["MEASURES", "VERDICT_KINDS", "find_verdicts"]
 

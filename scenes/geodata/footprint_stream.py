@@ -20,12 +20,14 @@ from ...core.errors import InputError, UnsupportedError
 from ...core.inputs import require_file
 from ...core.plain_paths import plain_path
 from .crs import file_crs, named_crs, require_metric
-from .footprints import Footprints, Repair
+from .footprints import Footprints
 from .ogr_layers import quiet
+from .outline_batch import OutlineBatch
+from .simple_rings import plain_outlines
 from .vector_files import DRIVERS, building_column, named_or_none, readable_layer, split_layer
 from .wkb import geometries_of_wkb
 
-__all__ = ["FootprintStream", "open_stream"]
+__all__ = ["FootprintStream", "open_stream", "wkb_buffers"]
 
 #: Features of a batch.
 _BATCH = 1 << 17
@@ -76,35 +78,47 @@ class FootprintStream:
         ):
             yield from found[1]
 
-    def footprints(self) -> Iterator[tuple[Footprints, Any]]:
-        """Yield clean footprints, and their values in the column `building_id` (None without one).
+    def outlines(self) -> Iterator[tuple[OutlineBatch, Any]]:
+        """Yield clean outlines, and their values in the column `building_id` (None without one).
 
-        Ids and repairs count the features of the file.
+        Ids and repairs count the features of the file. The outlines and repairs are those of `Footprints.of`.
         """
         first = 0
         for batch in self.batches([] if self.building_id is None else [self.building_id]):
-            geometries, closed = geometries_of_wkb(self.wkb(batch), self.file)
+            column = self.wkb(batch)
+            plain = plain_outlines(*wkb_buffers(column))
+            rest = np.ones(len(column), dtype=bool)
+            rest[plain.rows] = False
+            rows = np.flatnonzero(rest)
+            geometries, closed = geometries_of_wkb(
+                column.take(_arrow().array(rows)).to_numpy(zero_copy_only=False), self.file
+            )
             found = Footprints.of(geometries, crs=self.crs, source=str(self.file))
             reported = {repair.id for repair in found.repairs}
             repairs = [*found.repairs, *(repair for repair in closed if repair.id not in reported)]
+            numbered = tuple(replace(repair, id=int(rows[repair.id])) for repair in repairs)
+            outlines = OutlineBatch.joined(plain, replace(found, ids=rows[found.ids], repairs=numbered), first)
             labels = None
             if self.building_id is not None:
-                labels = batch.column(batch.schema.get_field_index(self.building_id)).take(_arrow().array(found.ids))
-            yield (
-                replace(
-                    found,
-                    ids=found.ids + first,
-                    repairs=tuple(Repair(repair.id + first, repair.problem, repair.action) for repair in repairs),
-                ),
-                labels,
-            )
+                labels = batch.column(batch.schema.get_field_index(self.building_id))
+                labels = labels.take(_arrow().array(outlines.ids - first))
+            yield outlines, labels
             first += len(batch)
 
-    def wkb(self, batch: Any) -> NDArray[np.object_]:
-        """Return the geometries of a batch as WKB."""
-        place = batch.schema.get_field_index(self.geometry)
-        column: NDArray[np.object_] = batch.column(place).to_numpy(zero_copy_only=False)
-        return column
+    def wkb(self, batch: Any) -> Any:
+        """Return the geometries of a batch as a `pyarrow.Array` of WKB."""
+        column = batch.column(batch.schema.get_field_index(self.geometry))
+        return getattr(column, "storage", column)
+
+
+def wkb_buffers(column: Any) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Return offsets, shape (n + 1,), and bytes of a `pyarrow.Array` of binary values; missing ones have no bytes."""
+    column = column.cast(_arrow().large_binary())
+    _, offsets, data = column.buffers()
+    if data is None:
+        return np.zeros(len(column) + 1, dtype=np.int64), np.empty(0, dtype=np.uint8)
+    every = np.frombuffer(offsets, dtype=np.int64)[column.offset : column.offset + len(column) + 1]
+    return every, np.frombuffer(data, dtype=np.uint8)
 
 
 def open_stream(

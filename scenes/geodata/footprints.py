@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.errors import InputError
 from .crs import crs_label
+from .ring_measures import centres_of, quadrilaterals_of
 from .vector_columns import labels_of
 
 __all__ = ["Footprints", "Repair", "polygonal_part"]
@@ -38,8 +39,8 @@ _WIDEST_GAP = 100.0
 #: Coordinates of no system on earth, metres; squares of such numbers are not finite.
 _FARTHEST = 1e9
 
-#: Geometries that a thread tests at a time.
-_CHUNK = 1 << 14
+#: Geometries that a thread tests at a time, and number from which on compiled code tests them first.
+_CHUNK, _MANY = 1 << 14, 50_000
 
 #: Stands for "number the rows from 0".
 _UNNUMBERED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
@@ -233,14 +234,7 @@ class Footprints:
     @cached_property
     def quadrilaterals(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Indices (m,) and corners (m, 4, 2), counter-clockwise, of the convex quadrilaterals without holes."""
-        start, points = self.rings
-        candidates = np.flatnonzero(np.diff(start) == 5)  # a closed ring; two rings take nine rows
-        corners = points[start[candidates][:, None] + np.arange(4)]
-        turns = _turns(corners)
-        left, right = np.asarray((turns > 0).all(axis=1)), np.asarray((turns < 0).all(axis=1))
-        corners = np.where(right[:, None, None], corners[:, ::-1], corners)
-        convex = left | right
-        return candidates[convex], np.ascontiguousarray(corners[convex])
+        return quadrilaterals_of(*self.rings)
 
     @cached_property
     def rings(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -274,46 +268,7 @@ class Footprints:
     @cached_property
     def centres(self) -> NDArray[np.float64]:
         """Centre of each footprint, shape (n, 2), metres (2010 paper, section 4.1)."""
-        centres = np.empty((len(self), 2))
-        index, corners = self.quadrilaterals
-        others = np.ones(len(self), dtype=bool)
-        others[index] = False
-        if others.any():
-            centres[others] = _centroids(*self.rings)[others]
-        if len(index):
-            first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-            offset = corners[:, 1] - corners[:, 0]
-            along = offset[:, 0] * second[:, 1] - offset[:, 1] * second[:, 0]
-            along /= first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-            centres[index] = corners[:, 0] + along[:, None] * first
-        return centres
-
-
-def _turns(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the cross product of the two edges at each corner of quadrilaterals (n, 4, 2), shape (n, 4)."""
-    edges = np.roll(corners, -1, axis=1) - corners
-    following = np.roll(edges, -1, axis=1)
-    turns: NDArray[np.float64] = edges[..., 0] * following[..., 1] - edges[..., 1] * following[..., 0]
-    return turns
-
-
-def _centroids(start: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the area centroid of each footprint with these rings, shape (n, 2)."""
-    counts = np.diff(start)
-    some = counts > 0
-    origin = np.full((len(counts), 2), np.nan)
-    origin[some] = points[start[:-1][some]]
-    # Coordinates from the first vertex keep all digits however far the scene is from the origin of its CRS.
-    x, y = (points - np.repeat(origin, counts, axis=0)).T
-    turn = x[:-1] * y[1:] - x[1:] * y[:-1]
-    moments = np.stack([turn, turn * (x[:-1] + x[1:]), turn * (y[:-1] + y[1:])], axis=1)
-    moments[np.isnan(turn)] = 0.0  # between two rings
-    moments[start[1:-1][counts[:-1] > 0] - 1] = 0.0  # between two footprints
-    sums = np.zeros((len(counts), 3))
-    sums[some] = np.add.reduceat(moments, start[:-1][some], axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        centroids: NDArray[np.float64] = origin + sums[:, 1:] / (3 * sums[:, :1])
-    return centroids
+        return centres_of(*self.rings, self.quadrilaterals)
 
 
 def _as_geometry_array(polygons: Iterable[Any]) -> NDArray[np.object_]:
@@ -387,22 +342,17 @@ def _repaired(
 def _are_valid(geometries: NDArray[np.object_]) -> NDArray[np.bool_]:
     """Return which polygons are valid; many of them are tested by several threads.
 
-    Quadrilaterals that are clearly convex, as most footprints are, need no test by GEOS.
+    Of very many, those that compiled code recognises as valid need no test by GEOS.
     """
     if len(geometries) <= _CHUNK:
         return np.asarray(shapely.is_valid(geometries))
     valid = np.zeros(len(geometries), dtype=bool)
-    quadrilaterals = np.flatnonzero(
-        (shapely.get_type_id(geometries) == 3)
-        & (shapely.get_num_coordinates(geometries) == 5)
-        & (shapely.get_num_interior_rings(geometries) == 0)
-    )
-    corners = shapely.get_coordinates(geometries[quadrilaterals]).reshape(-1, 5, 2)[:, :4]
-    turns = _turns(corners)
-    # Rounding of coordinates and products moves a turn by less than this.
-    size = np.abs(corners).max(axis=(1, 2)) * np.ptp(corners, axis=1).max(axis=1)
-    clear = np.abs(turns).min(axis=1) > 1e-12 * size
-    valid[quadrilaterals] = clear & ((turns > 0).all(axis=1) | (turns < 0).all(axis=1))
+    if len(geometries) > _MANY:
+        from .simple_rings import clearly_simple  # loading the compiled code takes a moment
+
+        single = (shapely.get_type_id(geometries) == 3) & (shapely.get_num_interior_rings(geometries) == 0)
+        start = np.concatenate([[0], np.cumsum(shapely.get_num_coordinates(geometries[single]))]).astype(np.int64)
+        valid[single] = clearly_simple(start, shapely.get_coordinates(geometries[single]))
     rest = np.flatnonzero(~valid)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         parts = pool.map(shapely.is_valid, np.array_split(geometries[rest], len(rest) // _CHUNK + 1))
