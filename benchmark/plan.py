@@ -276,6 +276,9 @@ def differences(store: Store, run_id: int, identity: RunIdentity) -> list[str]:
         found.append("the program or file that it reads changed")
     if row.scene_key != identity.scene_key:
         found.append("the scene changed")
+    if row.benchmark != identity.benchmark:
+        before = "not recorded" if row.benchmark is None else row.benchmark
+        found.append(f"the version of the benchmark is {identity.benchmark}, was {before}")
     if row.seed != identity.seed:
         found.append(f"seed is {identity.seed}, was {row.seed}")
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -53,6 +54,13 @@ def score(
     index: IndexOption = None,
     form: FormatOption = "table",
     wide: WideOption = False,
+    all_versions: Annotated[
+        bool,
+        typer.Option(
+            "--all-versions",
+            help="Rank the runs of all versions of the benchmark together, not only those of the newest.",
+        ),
+    ] = False,
     store: StoreOption = DEFAULT_STORE,
     plugin: PluginOption = None,
 ) -> None:
@@ -60,6 +68,7 @@ def score(
 
     Exit code 2 when --check finds a problem, 3 when runs or evaluators failed, 4 when there is nothing to evaluate.
     """
+    from ..benchmark.analysis.report_contents import newest_runs
     from ..benchmark.plan import KeyedEvaluator
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
@@ -73,8 +82,9 @@ def score(
             raise ParameterError("name an evaluator by evaluator=, or footprints made elsewhere by footprints=")
         evaluators = tuple(KeyedEvaluator.of(make_evaluator(name)) for name in evaluator)
         with Store(store, must_exist=True) as opened:
-            rows = opened.runs(detector=detectors, scene=scenes)[::-1]
-            _show(opened, rows, evaluators, form, index=index, wide=wide, title=f"Stored runs of {store}")
+            rows = newest_runs(opened, detector=detectors, scene=scenes)
+            show = _Shown(form, index, wide, all_versions)
+            _show(opened, rows, evaluators, show, title=f"Stored runs of {store}")
         return
     if suite is None:
         raise ParameterError("footprints= needs a suite=: the scenes that the files belong to")
@@ -88,11 +98,13 @@ def score(
         others, own = _contributed(opened, chosen, footprints, label)
         rows, failed = [*others, *own], [row for row in own if row.status == "failed"]
         evaluators = tuple(KeyedEvaluator.of(one) for one in chosen.evaluators)
-        _show(opened, rows, evaluators, form, index=index, wide=wide, title=f"Suite {chosen.name}", failed=failed)
+        show = _Shown(form, index, wide, all_versions)
+        _show(opened, rows, evaluators, show, title=f"Suite {chosen.name}", failed=failed)
 
 
 def _contributed(store: Store, suite: Suite, folder: Path, label: str) -> tuple[list[RunRow], list[RunRow]]:
     """Run the footprints of a folder; return the other stored rows of the same scenes, and theirs."""
+    from ..benchmark.analysis.report_contents import newest_runs
     from ..benchmark.contribution import contribution_suite
     from ..benchmark.execution.runner import Execution, run_plan
     from ..benchmark.plan import make_plan, plan_content
@@ -105,7 +117,7 @@ def _contributed(store: Store, suite: Suite, folder: Path, label: str) -> tuple[
         result = run_plan(plan, store, execution=Execution(jobs=1), progress=report)
     keys = {run.identity.scene_key for run in plan.runs}
     labels = {row.label for row in result.rows}
-    others = [row for row in store.runs()[::-1] if row.scene_key in keys and row.label not in labels]
+    others = [row for row in newest_runs(store) if row.scene_key in keys and row.label not in labels]
     return others, list(result.rows)
 
 
@@ -122,14 +134,22 @@ def _check(suite: Suite, folder: Path) -> None:
         raise typer.Exit(2)
 
 
+@dataclass(frozen=True)
+class _Shown:
+    """How leaderboards are made and printed."""
+
+    form: Literal["table", "csv", "md", "json"]
+    index: str | None
+    wide: bool
+    all_versions: bool
+
+
 def _show(
     store: Store,
     rows: list[RunRow],
     evaluators: tuple[KeyedEvaluator, ...],
-    form: Literal["table", "csv", "md", "json"],
+    show: _Shown,
     *,
-    index: str | None,
-    wide: bool,
     title: str,
     failed: Sequence[RunRow] = (),
 ) -> None:
@@ -144,8 +164,11 @@ def _show(
         for run_id in good:
             if run_id not in known:
                 score_stored(store, run_id, (keyed,))
-    boards = [make_leaderboard(rows, store, keyed, title=title, rank_by=index) for keyed in evaluators]
-    show_leaderboards(boards, form, table_console(), wide=wide)
+    boards = [
+        make_leaderboard(rows, store, keyed, title=title, rank_by=show.index, all_versions=show.all_versions)
+        for keyed in evaluators
+    ]
+    show_leaderboards(boards, show.form, table_console(), wide=show.wide)
     unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
     print_unsuccessful([*unsuccessful_runs(failed), *unevaluated], messages())
     if unevaluated or failed:

@@ -1,4 +1,7 @@
-"""The package itself: its name, folder and version, and where its public names live.
+"""The package itself: its name, folder and versions, and where its public names live.
+
+The *benchmark version* is that of what results depend on besides the detectors: definitions of the indices, suites and
+generator. Results of different benchmark versions cannot be compared; results of releases with the same one can.
 
 `HOMES` maps each name of the public API to the module that defines it; the root resolves names by it, and content keys
 follow it when a plugin writes ``roofbench.name``.
@@ -8,11 +11,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["FOLDER", "HOMES", "NAME", "VERSION"]
+__all__ = ["BENCHMARK_VERSION", "FOLDER", "HOMES", "NAME", "VERSION"]
 
 NAME = __package__.partition(".")[0]
 FOLDER = Path(__file__).resolve().parents[1]
 VERSION = "0.2.0"
+#: Raised when a definition, a suite or the generator changes; stores of release 0.1 did not record it.
+BENCHMARK_VERSION = 1
 
 #: Public name to the module that defines it.
 HOMES = {

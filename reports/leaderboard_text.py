@@ -130,9 +130,10 @@ def leaderboard_data(board: Leaderboard) -> Table:
                 *(cell.value for cell in cells),
                 *(part for cell in cells for part in (cell.scenes, cell.low, cell.high)),
                 board.evaluator,
+                entry.benchmark,
             ]
         )
-    return Table.of((Column(name) for name in (*_FACTS, *_COSTS, *keys, *parts, "evaluator")), rows)
+    return Table.of((Column(name) for name in (*_FACTS, *_COSTS, *keys, *parts, "evaluator", "benchmark")), rows)
 
 
 def leaderboard_caption(board: Leaderboard) -> str:

@@ -18,12 +18,12 @@ _PRINTED = (
     Column("status", "left"),
     Column("detector", "left"),
     Column("scene", "left"),
-    *(Column(title) for title in ("seed", "found", "seconds", "CPU s", "MB")),
+    *(Column(title) for title in ("seed", "found", "seconds", "CPU s", "MB", "benchmark")),
     Column("reason", "left"),
 )
 _KEY = 8  # characters of a key
 #: Characters of the columns besides detector and scene: finding the widest of 100 000 numbers takes too long.
-_WIDTHS = (6, _KEY, 7, 4, 6, 8, 8, 6, 6)
+_WIDTHS = (6, _KEY, 7, 4, 6, 8, 8, 6, 9, 6)
 
 
 def format_listing(listing: Listing, form: Literal["table", "csv", "json"]) -> Iterator[str]:
@@ -44,8 +44,8 @@ def _lines(listing: Listing, sizes: Sizes) -> Iterator[str]:
     heading = zip(_PRINTED, widths, strict=True)
     cells = [f"{column.title:{'<' if column.align == 'left' else '>'}{width}}" for column, width in heading]
     yield "  ".join(cells) + "\n" + "  ".join("─" * width for width in widths) + "\n"
-    run, key, status, _, _, seed, found, seconds, cpu, memory, _ = widths
-    numbers = f"%{seed}d  %{found}s  %{seconds}.2f  %{cpu}.2f  %{memory}.0f"
+    run, key, status, _, _, seed, found, seconds, cpu, memory, benchmark, _ = widths
+    numbers = f"%{seed}d  %{found}s  %{seconds}.2f  %{cpu}.2f  %{memory}.0f  %{benchmark}s"
     template = f"%{run}d  %-{key}.{key}s  %-{status}s  %-{detector}s  %-{scene}s  {numbers}  %s"
     for lines in listing.lines(template):
         if not "".join(lines).isprintable():
@@ -60,9 +60,20 @@ def _cells(listing: Listing) -> Iterator[str]:
 
 
 def _row(number: int, key: str, status: str, label: str, scene: str, seed: int, *others: Any) -> tuple[Any, ...]:
-    detected, seconds, cpu_seconds, memory, _, _, reason = others
+    detected, seconds, cpu_seconds, memory, _, benchmark, _, reason = others
     costs = number_text(seconds, "s"), number_text(cpu_seconds, "s"), number_text(memory, "bytes")
-    return number, key[:_KEY], status, label, scene, seed, detected, *costs, reason
+    return (
+        number,
+        key[:_KEY],
+        status,
+        label,
+        scene,
+        seed,
+        detected,
+        *costs,
+        "?" if benchmark is None else benchmark,
+        reason,
+    )
 
 
 def _csv(listing: Listing) -> Iterator[str]:

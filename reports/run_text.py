@@ -25,6 +25,7 @@ def format_run(store: Store, row: RunRow) -> str:
         *(f"  note       {one_line(str(note))}" for note in store.run_notes([row.id]).get(row.id, ())),
         f"  seed       {row.seed}",
         f"  code       roofbench {row.version}, {len(code.modules)} modules, digest {code.digest[:16]}",
+        f"  benchmark  {'not recorded' if row.benchmark is None else f'version {row.benchmark}'}",
         f"  packages   {', '.join(f'{name} {version}' for name, version in code.packages.items())}",
         f"  cost       {row.seconds:.3f} s, CPU {row.cpu_seconds:.3f} s, {row.peak_memory / 1e6:.0f} MB",
         f"  machine    {', '.join(f'{name} {value}' for name, value in machine.items()) or 'not known'}",

@@ -16,6 +16,7 @@ from typing import Any, Self
 
 from ...core.errors import InputError, ParameterError, UnknownNameError
 from ...core.output import whole_file
+from ...core.package import BENCHMARK_VERSION
 from ...core.registry import nearest_hint
 from ...evaluators.base import Evaluator
 from ..identity.detector_code import DetectorCode
@@ -74,6 +75,8 @@ class Baseline:
     scenes : mapping of str to BaselineScene
     detectors : mapping of str to Measured
         By label.
+    benchmark : int, optional
+        Version of the benchmark; None in baselines of version 0.1.
     """
 
     suite: str
@@ -82,6 +85,7 @@ class Baseline:
     evaluator: PluginRecipe
     scenes: Mapping[str, BaselineScene]
     detectors: Mapping[str, Measured]
+    benchmark: int | None = BENCHMARK_VERSION
 
     def to_suite(self) -> Suite:
         """Return the suite that repeats it."""
@@ -146,7 +150,7 @@ class Baseline:
             "format": _FORMAT,
             "suite": self.suite,
             "created": self.created,
-            "roofbench": {"version": self.version.version, "commit": self.version.commit},
+            "roofbench": {"version": self.version.version, "commit": self.version.commit, "benchmark": self.benchmark},
             "evaluator": self.evaluator.to_dict(),
         }
         lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in head.items()]
@@ -221,6 +225,7 @@ class Baseline:
             evaluator=PluginRecipe(**content["evaluator"]),
             scenes=scenes,
             detectors=detectors,
+            benchmark=roofbench.get("benchmark"),
         )
 
 

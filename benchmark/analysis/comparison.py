@@ -13,6 +13,7 @@ from ..store.writer import Store
 from .inference import bootstrap_interval
 from .report_contents import newest_runs, stored_evaluators
 from .results import ComparedRow, StoreComparison
+from .versions import version_names
 
 __all__ = ["compare_stores"]
 
@@ -63,6 +64,12 @@ def compare_stores(
             if row is not None:
                 found.append(row)
     notes = []
+    versions = [", ".join(version_names(own)) for own in rows]
+    if versions[0] != versions[1]:
+        notes.append(
+            f"versions of the benchmark: A {versions[0]}, B {versions[1]}: differences may come from other "
+            "definitions or another generator"
+        )
     for name, cells, other in (("A", one, two), ("B", two, one)):
         alone = cells.keys() - other.keys()
         if alone:

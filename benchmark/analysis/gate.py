@@ -63,7 +63,7 @@ def margins_of(texts: Sequence[str], indices: Sequence[Index]) -> dict[str, floa
 
 
 def different_scenes(baseline: Baseline, candidate: Baseline) -> list[str]:
-    """Return one sentence for each difference between the scenes or evaluators of two baselines."""
+    """Return one sentence for each difference between two baselines that makes them incomparable."""
     found = []
     for name in sorted({*baseline.scenes, *candidate.scenes}):
         one, two = baseline.scenes.get(name), candidate.scenes.get(name)
@@ -71,6 +71,11 @@ def different_scenes(baseline: Baseline, candidate: Baseline) -> list[str]:
             found.append(f"scene {name} is only in the {'candidate' if one is None else 'baseline'}")
         elif one.content_hash != two.content_hash:
             found.append(f"scene {name} has changed since the baseline")
+    versions = baseline.benchmark, candidate.benchmark
+    if None not in versions and versions[0] != versions[1]:
+        found.append(
+            f"the version of the benchmark is {versions[1]}, that of the baseline {versions[0]}: save it again"
+        )
     if baseline.evaluator != candidate.evaluator:
         found.append("the evaluators or their parameters differ")
     missing = [label for label in baseline.detectors if label not in candidate.detectors]

@@ -27,6 +27,7 @@ from .inference import (
     scenes_needed,
 )
 from .results import Cell, Entry, Leaderboard, UnsuccessfulRun
+from .versions import comparable_runs, version_names
 
 __all__ = ["make_leaderboard", "repeat_command", "unsuccessful_runs"]
 
@@ -38,7 +39,13 @@ _MOST_ESTIMATES, _MOST_SCENES = 5, 4
 
 
 def make_leaderboard(
-    rows: Sequence[RunRow], store: Store, keyed: KeyedEvaluator, *, title: str, rank_by: str | None = None
+    rows: Sequence[RunRow],
+    store: Store,
+    keyed: KeyedEvaluator,
+    *,
+    title: str,
+    rank_by: str | None = None,
+    all_versions: bool = False,
 ) -> Leaderboard:
     """Return the leaderboard of stored runs by one evaluator.
 
@@ -51,6 +58,8 @@ def make_leaderboard(
     title : str
     rank_by : str, optional
         Key or symbol of an index; by default the one that the evaluator declares.
+    all_versions : bool
+        Rank the runs of all versions of the benchmark together, not only those of the newest.
 
     Notes
     -----
@@ -59,6 +68,7 @@ def make_leaderboard(
     detectors are compared on the other scenes. A detector that failed or never ran on one of these has no rank, because
     its values are over other scenes than those of the other detectors.
     """
+    rows, versions = comparable_runs(rows, all_versions=all_versions)
     evaluations = store.evaluations([row.id for row in rows if row.status == "ok"], keyed.evaluator, keyed.key)
     failures = store.evaluation_failures([row.id for row in rows if row.status == "ok"], keyed.key)
     counts = store.reference_counts()
@@ -89,6 +99,7 @@ def make_leaderboard(
         rank = None if not measured else entries[-1].rank if same else place + 1
         entries += board.entries(indices, rank=rank, group=groups.get(board.label, ""))
     notes = [
+        *versions,
         *skipping,
         *group_note,
         *_stability(complete, ranking),
@@ -240,6 +251,7 @@ class _Tally:
                     cpu_seconds=statistics.median(row.cpu_seconds for row in done) if done else None,
                     peak_memory=max((row.peak_memory for row in done), default=None),
                     cells={index.key: cell(index) for index in indices},
+                    benchmark="+".join(version_names(self.rows)),
                 )
             )
         return entries

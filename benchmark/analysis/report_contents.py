@@ -24,6 +24,7 @@ from .report_data import CostPoint, Provenance, Report, Sensitivity
 from .report_scenes import draw_scenes
 from .results import GateResult, Leaderboard
 from .sensitivity import stored_sensitivities
+from .versions import comparable_runs, version_names
 
 __all__ = ["fill_report", "newest_runs", "stored_evaluators"]
 
@@ -85,7 +86,8 @@ def fill_report(
     ----------
     store : Store
     rows : sequence of RunRow
-        Of every status; see `newest_runs`.
+        Of every status; see `newest_runs`. Those of older versions of the benchmark are left out, which a note of the
+        leaderboards says.
     title : str
     evaluated : sequence of (KeyedEvaluator, Leaderboard), optional
         Evaluators with their leaderboards, where the caller has them.
@@ -97,9 +99,11 @@ def fill_report(
     level : float
         Level of the break-down points.
     """
+    every = rows
+    rows, _ = comparable_runs(rows)
     if evaluated is None:
         evaluated = [
-            (keyed, make_leaderboard(rows, store, keyed, title=title, rank_by=rank_by if place == 0 else None))
+            (keyed, make_leaderboard(every, store, keyed, title=title, rank_by=rank_by if place == 0 else None))
             for place, keyed in enumerate(stored_evaluators(store, rows))
         ]
     if not rows or not evaluated:
@@ -218,6 +222,7 @@ def _provenance(store: Store, rows: Sequence[RunRow]) -> Provenance:
     facts = [
         ("report made by", f"roofbench {code_version()}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"),
         ("runs made by", "; ".join(f"roofbench {version}" for version in dict.fromkeys(row.version for row in rows))),
+        ("version of the benchmark", ", ".join(version_names(rows))),
         ("command", "; ".join(store.commands()) or "not kept"),
         ("runs", f"{len(rows):,} from {min(row.finished for row in rows)} to {max(row.finished for row in rows)}"),
         ("store", f"{store.path.name}, {store.count_runs():,} runs in all"),

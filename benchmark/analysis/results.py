@@ -84,6 +84,8 @@ class Entry:
         Highest of all runs, bytes.
     cells : mapping of str to Cell
         By index key.
+    benchmark : str
+        Versions of the benchmark of its runs, the newest first: ``1``, ``unknown`` or ``2+1``.
     """
 
     label: str
@@ -101,6 +103,7 @@ class Entry:
     cpu_seconds: float | None
     peak_memory: int | None
     cells: Mapping[str, Cell]
+    benchmark: str
 
 
 @dataclass(frozen=True, kw_only=True)

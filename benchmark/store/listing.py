@@ -18,10 +18,10 @@ __all__ = ["Listing", "Sizes", "list_runs"]
 
 _COLUMNS = {
     "few": """runs.id AS id, runs.key AS key, status, label, scenes.name AS scene, seed, detected, seconds, cpu_seconds,
-        peak_memory, version, finished, reason""",
+        peak_memory, version, benchmark, finished, reason""",
     "all": """runs.id AS id, runs.key AS key, detector, label, fingerprint, seed, scenes.name AS scene, scene_id,
-        scenes.key AS scene_key, scene_group, version, status, reason, traceback, finished, seconds, cpu_seconds,
-        peak_memory, detected""",
+        scenes.key AS scene_key, scene_group, version, benchmark, status, reason, traceback, finished, seconds,
+        cpu_seconds, peak_memory, detected""",
 }
 _FROM = "FROM runs JOIN scenes ON scenes.id = scene_id"
 _AT_ONCE = 5000  # rows
@@ -79,10 +79,11 @@ class Listing:
         ----------
         template : str
             Template of ``printf`` for run, key, status, label, scene, seed, number of detections, seconds, CPU seconds,
-            megabytes, reason.
+            megabytes, version of the benchmark, reason.
         """
         line = """RTRIM(PRINTF(?, runs.id, runs.key, status, label, scenes.name, seed, IFNULL(detected, ''), seconds,
-            cpu_seconds, peak_memory / 1e6, reason))"""
+            cpu_seconds, peak_memory / 1e6,
+            IFNULL(benchmark, '?'), reason))"""
         for _, rows in self._read(f"SELECT {line} {_FROM} {self.condition}", template):
             yield [line for (line,) in rows]
 

@@ -24,8 +24,8 @@ from .records import RunRow, StoredScene
 __all__ = ["StoreReader"]
 
 _SELECT_RUNS = """SELECT runs.id, runs.key, detector, label, parameters AS parameters_text, fingerprint, seed,
-    scenes.name AS scene, recipe AS recipe_text, scene_id, scenes.key AS scene_key, scene_group, version, status,
-    reason, traceback, finished, seconds, cpu_seconds, peak_memory, detected
+    scenes.name AS scene, recipe AS recipe_text, scene_id, scenes.key AS scene_key, scene_group, version, benchmark,
+    status, reason, traceback, finished, seconds, cpu_seconds, peak_memory, detected
     FROM runs JOIN scenes ON scenes.id = scene_id"""
 
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import shapely
 
 from ...core.digests import digest
+from ...core.package import BENCHMARK_VERSION
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..identity.keys import SourceClosure
@@ -43,6 +44,8 @@ class RunIdentity:
     scene : SceneRecipe
     scene_key : str
     seed : int
+    benchmark : int
+        Version of the definitions, the suites and the generator.
     """
 
     detector: PluginRecipe
@@ -52,6 +55,7 @@ class RunIdentity:
     scene: SceneRecipe
     scene_key: str
     seed: int
+    benchmark: int = BENCHMARK_VERSION
 
     @property
     def key(self) -> str:
@@ -64,12 +68,16 @@ class RunIdentity:
                 "code": self.code.digest,
                 "scene": self.scene_key,
                 "seed": self.seed,
+                "benchmark": self.benchmark,
             }
         )
 
 
 class RunRow(NamedTuple):
-    """A stored run without its detections; a tuple, because many of them are made."""
+    """A stored run without its detections; a tuple, because many of them are made.
+
+    `benchmark` is None in stores that did not record it.
+    """
 
     id: int
     key: str
@@ -84,6 +92,7 @@ class RunRow(NamedTuple):
     scene_key: str
     scene_group: str
     version: str
+    benchmark: int | None
     status: Status
     reason: str
     traceback: str

@@ -13,7 +13,7 @@ from ...core.errors import InputError
 
 __all__ = ["VERSION", "prepare"]
 
-VERSION = 4
+VERSION = 5
 
 #: One script per version: MIGRATIONS[n] leads from version n to n + 1.
 MIGRATIONS: tuple[str, ...] = (
@@ -145,6 +145,11 @@ MIGRATIONS: tuple[str, ...] = (
         reason TEXT NOT NULL,
         PRIMARY KEY (run_id, key)
     );
+    """,
+    # The version of the benchmark (definitions, suites, generator); NULL where it was not recorded.
+    """
+    ALTER TABLE runs ADD COLUMN benchmark INTEGER;
+    ALTER TABLE evaluations ADD COLUMN benchmark INTEGER;
     """,
 )
 

@@ -16,6 +16,7 @@ from typing import Any, Self
 
 from ...core.digests import canonical
 from ...core.errors import OutputError
+from ...core.package import BENCHMARK_VERSION
 from ...evaluators.verdict_table import SIDES
 from ..identity.keys import SourceClosure
 from ..identity.recipes import SceneRecipe
@@ -82,8 +83,8 @@ class Store(StoreReader):
             ok = outcome.status == "ok"
             cursor = db.execute(
                 """INSERT INTO runs (key, detector, label, parameters, fingerprint, seed, scene_id, code_id, machine_id,
-                   version, status, reason, traceback, finished, seconds, cpu_seconds, peak_memory, detected,
-                   attributes, metadata) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)""",
+                   version, benchmark, status, reason, traceback, finished, seconds, cpu_seconds, peak_memory, detected,
+                   attributes, metadata) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)""",
                 (
                     identity.key,
                     identity.detector.use,
@@ -95,6 +96,7 @@ class Store(StoreReader):
                     self._code(identity.code),
                     self._machine(outcome.machine),
                     version,
+                    identity.benchmark,
                     outcome.status,
                     outcome.reason,
                     outcome.traceback,
@@ -136,8 +138,8 @@ class Store(StoreReader):
         key = evaluation_key(score.evaluator, score.code)
         self._db.execute("DELETE FROM evaluation_failures WHERE run_id = ? AND key = ?", (run_id, key))
         cursor = self._db.execute(
-            """INSERT OR IGNORE INTO evaluations (run_id, key, evaluator, parameters, code, tallies, notes)
-               VALUES (?,?,?,?,?,?,?)""",
+            """INSERT OR IGNORE INTO evaluations (run_id, key, evaluator, parameters, code, tallies, notes, benchmark)
+               VALUES (?,?,?,?,?,?,?,?)""",
             (
                 run_id,
                 key,
@@ -146,6 +148,7 @@ class Store(StoreReader):
                 score.code,
                 canonical(dict(score.tallies)),
                 canonical(list(score.notes)),
+                BENCHMARK_VERSION,
             ),
         )
         if not cursor.rowcount:

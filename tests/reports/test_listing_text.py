@@ -49,7 +49,7 @@ def _at_once(request, monkeypatch):
 def test_all_forms_hold_all_runs_whatever_the_size_of_the_pieces(tmp_path):
     path = fill(tmp_path / "runs.sqlite", ["one", "two", "a-long-label"], "no roof")
     heading, rule, *lines, total = text_of(path, "table").splitlines()
-    assert " ".join(heading.split()) == "run key status detector scene seed found seconds CPU s MB reason"
+    assert " ".join(heading.split()) == "run key status detector scene seed found seconds CPU s MB benchmark reason"
     assert set(rule) == {"─", " "}
     assert [line.split()[3] for line in lines] == ["a-long-label", "two", "one"]
     assert lines[1].endswith("no roof")
