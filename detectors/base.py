@@ -12,6 +12,7 @@ from __future__ import annotations
 import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -84,6 +85,13 @@ class Detector(Parameterised, ABC):
         It is part of the key of stored runs: when it changes, they are computed anew.
         """
         return ""
+
+    def code_files(self) -> tuple[Path, ...]:
+        """Return the files and folders outside Python that it runs or reads and that belong to its code.
+
+        A baseline keeps a copy of small ones, so that the gate can time the old program beside the new one.
+        """
+        return ()
 
     def own_label(self) -> str:
         """Return its name in tables where it is not the name with changed parameters; empty for most."""

@@ -239,7 +239,7 @@ def measure(
         if row.scene not in scenes:
             scene = store.scene(row.scene_id)
             if scene.content_hash is not None and scene.reference is not None:
-                scenes[row.scene] = BaselineScene(_portable(scene.recipe), scene.content_hash)
+                scenes[row.scene] = BaselineScene(scene.recipe.relative_to(Path.cwd()), scene.content_hash)
     detectors = {}
     for entry in suite.detectors:
         runs: dict[tuple[str, int], Mapping[str, float | None] | None] = {}
@@ -247,8 +247,8 @@ def measure(
             if row.label == entry.label and row.scene in scenes:
                 found = values.get(row.id)
                 runs[row.scene, row.seed] = None if found is None else _rounded(found, keyed.evaluator)
-        recipe, code = PluginRecipe.of(entry.detector), DetectorCode.of(entry.detector)
-        detectors[entry.label] = Measured(recipe, entry.seeds, runs, code)
+        recipe = PluginRecipe.of(entry.detector).relative_to(Path.cwd())
+        detectors[entry.label] = Measured(recipe, entry.seeds, runs, DetectorCode.of(entry.detector))
     return Baseline(
         suite=suite.name,
         version=version,
@@ -263,11 +263,3 @@ def _rounded(values: Mapping[str, float | None], evaluator: Evaluator) -> dict[s
     """Return the values in the evaluator's order, rounded."""
     found = {index.key: values.get(index.key) for index in evaluator.indices}
     return {key: None if value is None else round(value, _DECIMALS) for key, value in found.items()}
-
-
-def _portable(recipe: SceneRecipe) -> SceneRecipe:
-    """Return the recipe with a relative path for a folder below the working directory, for other machines."""
-    place = Path(recipe.place)
-    if recipe.kind == "folder" and place.is_relative_to(Path.cwd()):
-        return replace(recipe, place=str(place.relative_to(Path.cwd())))
-    return recipe

@@ -20,6 +20,7 @@ from ...core.digests import digest
 from ...core.errors import InputError
 from ...core.package import NAME
 from ...detectors.base import Detector
+from .kept_files import KeptFiles
 from .keys import module_file, source_closure
 
 __all__ = ["DetectorCode"]
@@ -41,12 +42,15 @@ class DetectorCode:
         Of the program or file that the detector reads; empty for most.
     sources : mapping of str to str
         Text of the plugin's modules by path, relative to the folder from which they are imported.
+    kept : KeptFiles, optional
+        Copies of its program and of the files that belong to it, where they are small.
     """
 
     framework: str
     plugin: str = ""
     fingerprint: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
+    kept: KeptFiles | None = None
 
     @classmethod
     def of(cls, detector: Detector) -> Self:
@@ -66,6 +70,7 @@ class DetectorCode:
             plugin=digest({path: value for path, (_, value) in files.items()}) if files else "",
             fingerprint=detector.fingerprint(),
             sources=dict(sorted(sources.items())),
+            kept=KeptFiles.of(detector),
         )
 
     @property
@@ -84,17 +89,20 @@ class DetectorCode:
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON content."""
+        kept = {} if self.kept is None else {"kept": self.kept.to_dict()}
         return {
             "framework": self.framework,
             "plugin": self.plugin,
             "fingerprint": self.fingerprint,
             "sources": dict(self.sources),
+            **kept,
         }
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         """Return the code of what `to_dict` returned."""
-        return cls(**content)
+        kept = content.get("kept")
+        return cls(**{**content, "kept": None if kept is None else KeptFiles(**kept)})
 
 
 def _path_of(module: str) -> str:

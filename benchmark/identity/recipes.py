@@ -6,9 +6,10 @@ the store carry recipes and paths instead of megabytes.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, Self, cast
@@ -18,6 +19,7 @@ from ...core.errors import ParameterError, UnknownNameError, UnsupportedError
 from ...core.parameters import parameter_text
 from ...core.registry import Registry, nearest_hint
 from ...detectors.base import Detector
+from ...detectors.external.external_paths import with_relative_paths
 from ...detectors.external.precomputed import Precomputed
 from ...detectors.registry import DETECTORS, make_detector
 from ...evaluators.base import Evaluator
@@ -37,6 +39,8 @@ __all__ = ["PluginRecipe", "SceneRecipe", "code_digest", "fingerprint_on", "labe
 _HAMLET = "hamlet"
 _GENERATOR = "scenes.synthetic"
 _BUILTIN = "scenes.builtin"
+#: Detectors with paths among their parameters.
+_WITH_PATHS = ("command", "precomputed")
 
 
 def label_of(plugin: Detector | Evaluator) -> str:
@@ -90,6 +94,15 @@ class PluginRecipe:
     def evaluator(self) -> Evaluator:
         """Return the evaluator."""
         return make_evaluator(self.use, {**self.parameters, **self.execution})
+
+    def relative_to(self, folder: Path) -> Self:
+        """Return the recipe with relative paths to what lies below a folder, for another clone or machine."""
+        path, colon, name = self.use.rpartition(":")
+        if path.endswith(".py") and Path(path).is_relative_to(folder):
+            return replace(self, use=f"{os.path.relpath(path, folder)}{colon}{name}")
+        if self.use in _WITH_PATHS:
+            return replace(self, parameters=with_relative_paths(self.parameters, folder))
+        return self
 
     def to_dict(self, *, execution: bool = False) -> dict[str, Any]:
         """Return what JSON holds: the identity, and with `execution` also the execution options."""
@@ -168,6 +181,16 @@ class SceneRecipe:
         """Return the recipe of a scene object: it stays in this process, or other processes read the spooled file."""
         kind: Literal["spooled", "memory"] = "memory" if spooled is None else "spooled"
         return cls(kind, scene.name, str(spooled or ""), content_hash=scene.content_hash)
+
+    def relative_to(self, folder: Path) -> Self:
+        """Return the recipe with a relative path to a scene below a folder, for another clone or machine."""
+        if self.kind == "folder" and Path(self.place).is_relative_to(folder):
+            return replace(self, place=os.path.relpath(self.place, folder))
+        return self
+
+    def absolute(self) -> Self:
+        """Return the recipe with an absolute path, for a process in another working folder."""
+        return replace(self, place=os.path.abspath(self.place)) if self.kind == "folder" else self
 
     @property
     def word(self) -> str:

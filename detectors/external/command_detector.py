@@ -128,6 +128,12 @@ class Command(Detector):
         paths += [Path(found) for program in programs if (found := shutil.which(program))]
         return content_digest(paths) + "".join(f" {name} {_version(name)}" for name in packages)
 
+    def code_files(self) -> tuple[Path, ...]:
+        """Return the program, the files among its arguments and those of `files`, but no installed program."""
+        paths = [Path(word) for word in (*split_words(self.run, "run"), *split_words(self.files, "files"))]
+        found = [path for path in paths if path.is_absolute() and path.exists()]
+        return tuple(path for path in found if shutil.which(path.name) != str(path))
+
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Return the footprints that the program wrote; metadata keep what it printed."""
         scene = scene.for_detection()

@@ -16,7 +16,15 @@ from typing import Any
 
 from ...core.errors import InputError, ParameterError
 
-__all__ = ["absolute_words", "content_digest", "split_words", "with_absolute_paths"]
+__all__ = [
+    "absolute_words",
+    "content_digest",
+    "files_of",
+    "moved_words",
+    "split_words",
+    "with_absolute_paths",
+    "with_relative_paths",
+]
 
 
 def split_words(text: str, parameter: str) -> list[str]:
@@ -39,6 +47,16 @@ def absolute_words(text: str, parameter: str, folder: Path) -> str:
     return shlex.join(os.path.abspath(folder / word) if word and (folder / word).exists() else word for word in words)
 
 
+def moved_words(text: str, parameter: str, old: Path, new: Path) -> str:
+    """Return a text of words in which paths below the folder `old` are below `new`, where they exist there."""
+    words = []
+    for word in split_words(text, parameter):
+        place = Path(os.path.abspath(word))
+        moved = new / place.relative_to(old) if place.is_relative_to(old) else place
+        words.append(str(moved) if word and moved.exists() else word)
+    return shlex.join(words)
+
+
 def with_absolute_paths(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return parameters of `command` or `precomputed` whose paths are relative to a folder, with absolute paths."""
     changed = dict(values)
@@ -50,16 +68,33 @@ def with_absolute_paths(values: Mapping[str, Any], folder: Path) -> dict[str, An
     return changed
 
 
+def with_relative_paths(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return parameters of `command` or `precomputed` in which paths below a folder are relative to it."""
+
+    def relative(word: str) -> str:
+        below = os.path.isabs(word) and Path(word).is_relative_to(folder)
+        return os.path.relpath(word, folder) if below else word
+
+    changed = dict(values)
+    for name in ("run", "files"):
+        if isinstance(values.get(name), str):
+            changed[name] = shlex.join(map(relative, split_words(values[name], name)))
+    if isinstance(values.get("folder"), str) and values["folder"]:
+        changed["folder"] = relative(values["folder"])
+    return changed
+
+
 def content_digest(paths: Iterable[Path]) -> str:
     """Return the SHA-256 of the content of files, and of all files below folders with their relative names."""
     digest = hashlib.sha256()
     for path in paths:
-        for name, file in _files_of(path):
+        for name, file in files_of(path):
             digest.update(f"{name} {_file_digest(file)}\n".encode())
     return digest.hexdigest()
 
 
-def _files_of(path: Path) -> Iterator[tuple[str, Path]]:
+def files_of(path: Path) -> Iterator[tuple[str, Path]]:
+    """Yield a file with its name, or all files below a folder with their relative names."""
     if path.is_dir():
         for file in sorted(path.rglob("*")):
             if file.is_file() and file.parent.name != "__pycache__":

@@ -342,7 +342,7 @@ def opened(file: Path, *, alpha: bool | None = None) -> Iterator[Any]:
     import warnings
 
     import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
 
     require_file(file, "a raster, for instance a GeoTIFF")
     try:
@@ -356,7 +356,7 @@ def opened(file: Path, *, alpha: bool | None = None) -> Iterator[Any]:
                     return
                 with _with_last_band(source, "alpha" if alpha else "undefined") as view:
                     yield view
-    except RasterioError as error:
+    except (RasterioError, RasterioIOError) as error:  # two kinds before rasterio 1.4
         cause = error.__cause__ or error
         reason = " ".join(str(cause).split())
         raise InputError(f"{file} cannot be read as an image ({reason}): give a GeoTIFF") from error

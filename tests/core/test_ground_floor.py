@@ -24,6 +24,8 @@ HEAVY = (
     "laspy",
     "PIL",
 )
+#: Those that an interpreter may load when it starts.
+OF_THE_SYSTEM = {"sitecustomize", "usercustomize"}
 #: Those that pyogrio loads by itself where they are installed.
 OF_PYOGRIO = {"pandas", "geopandas", "pyarrow"}
 
@@ -85,4 +87,4 @@ def test_the_ground_floor_is_imported_with_numpy_and_shapely_alone(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     loaded = {name for name in done.stdout.split() if name not in sys.stdlib_module_names and not name.startswith("_")}
-    assert loaded <= {"roofbench", "numpy", "shapely", "cython_runtime"}
+    assert loaded <= {"roofbench", "numpy", "shapely", "cython_runtime", *OF_THE_SYSTEM}

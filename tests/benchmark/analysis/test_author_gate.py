@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from copy import copy
 
 import pytest
 from harness.effort import NIGHTLY
@@ -37,6 +38,43 @@ class Mine(rb.Detector):
             pass
         return found.take(np.arange(len(found)) % 4 < kept())
 '''
+#: A program that roofbench calls: rectangles around connected cells that are high above the lowest point.
+PROGRAM = """
+import csv
+import json
+import sys
+import time
+
+from rules import kept, seconds
+
+scene, _, output = sys.argv[1:]
+with open(f"{scene}/points.csv") as stream:
+    points = [(float(row["x"]), float(row["y"]), float(row["z"])) for row in csv.DictReader(stream)]
+high = min(z for _, _, z in points) + 4
+cells = {(x // 1, y // 1) for x, y, z in points if z > high}
+features = []
+for start in sorted(cells):
+    region, waiting = [], [start] if start in cells else []
+    cells.discard(start)
+    while waiting:
+        x, y = waiting.pop()
+        region.append((x, y))
+        for near in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)):
+            if near in cells:
+                cells.remove(near)
+                waiting.append(near)
+    if len(region) < 20:
+        continue
+    west, east = min(x for x, _ in region), max(x for x, _ in region) + 1
+    south, north = min(y for _, y in region), max(y for _, y in region) + 1
+    ring = [[west, south], [east, south], [east, north], [west, north], [west, south]]
+    features.append({"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}})
+features = [feature for number, feature in enumerate(features) if number % 4 < kept()]
+while time.process_time() < 4 * seconds():
+    pass
+with open(output, "w") as stream:
+    json.dump({"type": "FeatureCollection", "crs": None, "features": features}, stream)
+"""
 HELPER = "def kept():\n    return {kept}\n\n\ndef seconds():\n    return {seconds}\n"
 SUITE = """
 name = "own"
@@ -58,7 +96,12 @@ class Author:
     def __init__(self, folder, site, layout, *, in_git):
         self.folder, self.site, self.layout = folder, site, layout
         folder.mkdir()
-        if layout == "package":
+        more = ""
+        if layout == "command":
+            (folder / "mine.py").write_text(PROGRAM)
+            self.helper, use = folder / "rules.py", "command"
+            more = f'run = "{sys.executable} mine.py"\nfiles = "rules.py"\npoints = "csv"\nlabel = "mine"\n'
+        elif layout == "package":
             package = folder / "mydetector"
             package.mkdir()
             (package / "__init__.py").write_text("from .model import Mine\n")
@@ -72,7 +115,7 @@ class Author:
             (folder / "mine.py").write_text(DETECTOR.format(helper="rules"))
             self.helper, use = folder / "rules.py", "mine.py:Mine"
         self.change(FAST)
-        (folder / "suite.toml").write_text(SUITE.format(use=use))
+        (folder / "suite.toml").write_text(SUITE.format(use=use) + more)
         if in_git:
             self.git("init", "-q")
             self.git("add", "-A")
@@ -112,11 +155,11 @@ def site(tmp_path_factory):
     return place
 
 
-@pytest.fixture(scope="module", params=["files in git", "files", "package"] if NIGHTLY else ["files"])
+@pytest.fixture(scope="module", params=["files in git", "files", "package", "command"] if NIGHTLY else ["files"])
 def author(request, site, tmp_path_factory):
-    layout = "package" if request.param == "package" else "files"
+    layout = "files" if request.param == "files in git" else request.param
     folder = tmp_path_factory.mktemp("author") / "repository"
-    return Author(folder, site, layout, in_git=request.param != "files")
+    return Author(folder, site, layout, in_git=request.param in ("files in git", "package"))
 
 
 def test_an_unchanged_plugin_passes_and_its_time_is_not_compared_with_itself(author):
@@ -149,3 +192,17 @@ def test_a_change_that_costs_nothing_passes(author):
     code, err, conclusions = author.gate("--time", "--time-margin", "0.15")
     assert code == 0, err
     assert conclusions["cost.cpu_ratio"] in {"equal", "undecided"}
+
+
+def test_the_baseline_serves_another_clone(author, tmp_path):
+    author.change(LOSS)
+    assert str(author.folder) not in (author.folder / "baseline.json").read_text()
+    clone = copy(author)
+    clone.folder = tmp_path / "clone"
+    shutil.move(author.folder, clone.folder)
+    try:
+        code, err, conclusions = clone.gate()
+    finally:
+        shutil.move(clone.folder, author.folder)
+    assert code == 1, err
+    assert conclusions["object.completeness"] == "worse"

@@ -1,5 +1,6 @@
 """Run time side by side: the old code really is old, and the same code is refused."""
 
+import sys
 from dataclasses import replace
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from roofbench.benchmark.analysis.baseline import Baseline, BaselineScene, Measured
 from roofbench.benchmark.analysis.timing import time_side_by_side
 from roofbench.benchmark.identity.detector_code import DetectorCode
+from roofbench.benchmark.identity.kept_files import MOST_BYTES, KeptFiles
 from roofbench.benchmark.identity.provenance import CodeVersion
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 from roofbench.core.errors import InputError, UnsupportedError
@@ -30,6 +32,14 @@ class Busy(rb.Detector):
             pass
         return rb.Footprints.empty(crs=scene.crs)
 '''
+
+PROGRAM = """
+import json, sys, time
+while time.process_time() < {seconds}:
+    pass
+with open(sys.argv[3], "w") as output:
+    json.dump({{"type": "FeatureCollection", "crs": None, "features": []}}, output)
+"""
 
 
 @pytest.fixture
@@ -93,11 +103,49 @@ def test_a_baseline_that_does_not_name_its_code_is_refused(measured):
         time_side_by_side(baseline(replace(old, code=None)), baseline(old))
 
 
-def test_a_detector_that_wraps_a_program_is_refused(measured):
-    _, old = measured("old", 0.0)
-    wraps = replace(old, code=replace(old.code, fingerprint="sha256 of a program"))
-    with pytest.raises(UnsupportedError, match="keeps no copy"):
-        time_side_by_side(baseline(wraps), baseline(old))
+@pytest.fixture
+def command(tmp_path):
+    def write(seconds, *, padding=0):
+        file = tmp_path / "slow.py"
+        file.write_text(PROGRAM.format(seconds=seconds) + "#" * padding)
+        detector = make_detector("command", {"run": f"{sys.executable} {file}"})
+        return Measured(PluginRecipe.of(detector).relative_to(tmp_path), (0,), {}, DetectorCode.of(detector))
+
+    return write
+
+
+def test_a_slower_program_is_found_by_the_copy_in_the_baseline(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    baseline(command(0.1)).save(tmp_path / "b.json")
+    (conclusion,) = time_side_by_side(Baseline.load(tmp_path / "b.json"), baseline(command(0.4)), repeats=1)
+    assert (conclusion.conclusion, conclusion.scenes) == ("worse", 6)
+
+
+def test_a_program_of_which_there_is_no_copy_is_refused(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    old = command(0.0, padding=MOST_BYTES)
+    assert old.code.kept is None
+    with pytest.raises(UnsupportedError, match="the old program of d is not available"):
+        time_side_by_side(baseline(old), baseline(command(0.1)))
+
+
+def test_an_unchanged_program_beside_a_changed_detector_is_no_obstacle(command, measured, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (_, old), (_, new) = measured("old", 0.0), measured("new", 0.01)
+    sides = [replace(baseline(found, scenes=1), detectors={"d": found, "c": command(0.0)}) for found in (old, new)]
+    (conclusion,) = time_side_by_side(*sides, repeats=1)
+    assert conclusion.detector == "d"
+
+
+@pytest.mark.parametrize("facts", [{"text": 3}, {"base64": "?"}, {}, None])
+def test_damaged_copies_are_refused(facts, tmp_path):
+    with pytest.raises(InputError, match=r"copy of 'a\.py' is damaged"):
+        KeptFiles(".", {"a.py": facts}).unpack(tmp_path)
+
+
+def test_copies_are_not_written_outside_their_folder(tmp_path):
+    with pytest.raises(InputError, match="outside its folder"):
+        KeptFiles(".", {"../a.py": {"text": ""}}).unpack(tmp_path / "inside")
 
 
 def test_sources_are_not_written_outside_their_folder(tmp_path):
