@@ -1,6 +1,6 @@
 """Kill commands at random moments, run them again, and compare what they wrote with that of an uninterrupted call.
 
-Stages: import, make, detect, run, sweep, report, and evaluate in parts, as national sets are. By hand, ten kills of each:
+Stages: import, make, detect, run, sweep, report, and evaluate in parts, as national sets are. Ten kills of each:
 ``python -m tests.harness.killed_stages 10``, or of some: ``python -m tests.harness.killed_stages 10 import report``.
 """
 
