@@ -26,12 +26,13 @@ _LARGE_FILE = 50_000_000
 def is_large(paths: tuple[str, str]) -> bool:
     """Return whether a file holds so many footprints that both are compared in parts."""
     from ..core.errors import RoofbenchError
-    from ..scenes.geodata.footprint_stream import open_stream
     from ..scenes.geodata.vector_files import split_layer
 
     files = [split_layer(path)[0] for path in paths]
     if not all(file.is_file() for file in files) or max(file.stat().st_size for file in files) < _LARGE_FILE:
         return False
+    from ..scenes.geodata.footprint_stream import open_stream  # needs the compiler, which small files do without
+
     try:
         return max(open_stream(path).count for path in paths) >= _MANY
     except RoofbenchError:
