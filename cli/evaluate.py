@@ -36,7 +36,8 @@ def evaluate(
     reference: Annotated[
         str,
         typer.Argument(
-            metavar="REFERENCE", help="Reference footprints, or a scene folder (its reference, area and pixel grid)."
+            metavar="REFERENCE",
+            help="Reference footprints, or a scene (folder or name): its reference, area and pixel grid.",
         ),
     ],
     evaluator: EvaluatorOption = None,

@@ -27,11 +27,12 @@ class Truth(NamedTuple):
 
 
 def read_truth(reference: str, *, building_id: str | None, crs: str | None, evaluation_area: str | None) -> Truth:
-    """Read the reference from a vector file or a scene folder, with its evaluation area and pixel grid."""
+    """Read the reference from a vector file or a scene (folder or name), with its evaluation area and pixel grid."""
     from ..core.errors import InputError
     from ..scenes.geodata.vector_files import read_footprints, read_polygon
+    from ..scenes.shipped import shipped_or_given
 
-    if Path(reference).is_dir():
+    if not Path(reference).is_file() and shipped_or_given(reference).is_dir():
         from ..scenes.folder import open_scene
 
         scene = open_scene(reference)

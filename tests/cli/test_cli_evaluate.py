@@ -158,6 +158,12 @@ def test_a_scene_folder_brings_reference_area_and_grid(files):
     assert "reference left out (2)" in drawing
 
 
+def test_a_scene_that_comes_with_roofbench_is_a_reference_by_its_name(tmp_path):
+    rb.write_footprints(rb.open_scene("ign").reference, tmp_path / "detected.gpkg")
+    answer = roofbench("evaluate", "detected.gpkg", "ign", "-f", "json", folder=tmp_path)
+    assert json.loads(answer.stdout)["object"]["quality"] == 1.0
+
+
 def test_houses_of_a_row_are_joined_to_blocks_on_request(files):
     row = [shapely.box(6 * k, 0, 6 * k + 5.95, 9) for k in range(5)]
     rb.write_footprints(rb.Footprints.of(row, crs="EPSG:25832"), files / "row.gpkg")
