@@ -26,6 +26,7 @@ import typing
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
+from .display import Displayed
 from .errors import ParameterError
 from .registry import nearest_hint
 
@@ -203,7 +204,7 @@ def parameter_text(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-class Parameterised:
+class Parameterised(Displayed):
     """Mixin of frozen dataclasses whose fields are parameters: checked on construction, listed on request.
 
     Attributes
@@ -215,6 +216,7 @@ class Parameterised:
         parameters that are absent always count.
     """
 
+    shown_by = "reports.notebook_view:parameters_view"
     modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {}
 

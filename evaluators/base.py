@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..core.display import Displayed
 from ..core.errors import InputError, ParameterError, UnknownNameError
 from ..core.parameters import Parameterised
 from ..core.registry import nearest_hint
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
 __all__ = ["Better", "Evaluation", "Evaluator", "Index", "Verdicts", "mean_values"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Evaluation:
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Evaluation(Displayed):
     """The result of comparing two footprint sets (or of pooling several such results).
 
     Attributes
@@ -51,10 +52,18 @@ class Evaluation:
         Makes the verdicts when they are asked for; a sweep of thousands of runs may never ask.
     """
 
+    shown_by = "reports.notebook_view:evaluation_view"
+
     evaluator: Evaluator
     tallies: Tallies
     notes: tuple[str, ...] = ()
     find_verdicts: Callable[[], Verdicts] | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        shown = self.evaluator.summary_indices(self.evaluator.ranking_index())[:4]
+        values = {index.symbol or index.key: self.values[index.key] for index in shown}
+        texts = (f"{name} {'undefined' if value is None else format(value, '.3g')}" for name, value in values.items())
+        return f"<Evaluation {self.evaluator.name}: {', '.join(texts)}>"
 
     @cached_property
     def values(self) -> Mapping[str, float | None]:

@@ -7,26 +7,35 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from shapely import Geometry, MultiPolygon, Polygon, is_valid, is_valid_reason
 
+from ..core.display import Displayed
 from ..core.errors import InputError
 from ..scenes.geodata.crs import require_metric
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.geodata.raster import Grid
 from .base import Evaluation, Evaluator
+from .given_footprints import GivenFootprints, GivenReference, given_sets
 from .registry import ALL, DEFAULT, all_evaluators, make_evaluator
 
 if TYPE_CHECKING:
     from .threshold_free.evaluator import ThresholdFreeEvaluation
 
-__all__ = ["evaluate", "evaluate_all", "pool"]
+__all__ = ["Evaluations", "evaluate", "evaluate_all", "pool"]
+
+
+class Evaluations(dict[str, Evaluation], Displayed):
+    """Evaluations of the same footprints by several evaluators, by name."""
+
+    shown_by = "reports.notebook_view:evaluations_view"
 
 
 @overload
 def evaluate(
-    detected: Footprints,
-    reference: Footprints,
+    detected: GivenFootprints,
+    reference: GivenReference,
     *,
     area: Geometry | None = None,
     grid: Grid | None = None,
+    building_id: str | None = None,
     matching: str = ...,
     gsd: float | None = ...,
     minimum_area: float = ...,
@@ -35,49 +44,56 @@ def evaluate(
 
 @overload
 def evaluate(
-    detected: Footprints,
-    reference: Footprints,
+    detected: GivenFootprints,
+    reference: GivenReference,
     *,
     evaluator: Literal["all"],
     area: Geometry | None = None,
     grid: Grid | None = None,
+    building_id: str | None = None,
     **parameters: Any,
-) -> dict[str, Evaluation]: ...
+) -> Evaluations: ...
 
 
 @overload
 def evaluate(
-    detected: Footprints,
-    reference: Footprints,
+    detected: GivenFootprints,
+    reference: GivenReference,
     *,
     evaluator: str | Evaluator = DEFAULT,
     area: Geometry | None = None,
     grid: Grid | None = None,
+    building_id: str | None = None,
     **parameters: Any,
 ) -> Evaluation: ...
 
 
 def evaluate(
-    detected: Footprints,
-    reference: Footprints,
+    detected: GivenFootprints,
+    reference: GivenReference,
     *,
     evaluator: str | Evaluator = DEFAULT,
     area: Geometry | None = None,
     grid: Grid | None = None,
+    building_id: str | None = None,
     **parameters: Any,
-) -> Evaluation | dict[str, Evaluation]:
+) -> Evaluation | Evaluations:
     """Compare detected with reference footprints.
 
     Parameters
     ----------
-    detected, reference : Footprints
-        In one projected CRS, metres.
+    detected : Footprints, GeoDataFrame, GeoSeries, path, or iterable of polygons
+    reference : the same, or Scene
+        Both in one projected CRS, metres; bare lists and arrays of polygons are taken in the CRS of the other. A scene
+        gives its reference, evaluation area and pixel grid.
     evaluator : str or Evaluator
         Name, ``name[parameter=value]``, or an evaluator; ``"all"`` for every one, see `evaluate_all`.
     area : polygon, optional
         Evaluation area: where the reference is complete.
     grid : Grid, optional
         Grid of the orthoimage, for indices counted in pixels.
+    building_id : str, optional
+        Column of the reference whose equal values mark the parts of one building.
     **parameters
         Parameters of the evaluator, for instance ``matching="overlap"``. (The parameter ``area`` of the default
         evaluator, how areas are measured, is set through its name: ``evaluator=f"{DEFAULT}[area=exact]"``.)
@@ -101,34 +117,38 @@ def evaluate(
     (0.5, 1.0)
     """
     if evaluator == ALL:
-        return evaluate_all(detected, reference, area=area, grid=grid, **parameters)
+        return evaluate_all(detected, reference, area=area, grid=grid, building_id=building_id, **parameters)
     chosen = make_evaluator(evaluator, parameters)
-    _require_comparable(detected, reference, area, chosen)
-    return chosen.evaluate(detected, reference, area=area, grid=grid)
+    (found,), truth = given_sets([detected], reference, area, grid, building_id=building_id)
+    _require_comparable(found, truth.footprints, truth.area, chosen)
+    return chosen.evaluate(found, truth.footprints, area=truth.area, grid=truth.grid)
 
 
 def evaluate_all(
-    detected: Footprints,
-    reference: Footprints,
+    detected: GivenFootprints,
+    reference: GivenReference,
     *,
     area: Geometry | None = None,
     grid: Grid | None = None,
+    building_id: str | None = None,
     **parameters: Any,
-) -> dict[str, Evaluation]:
+) -> Evaluations:
     """Compare detected with reference footprints by every evaluator; see `evaluate`.
 
     Parameters
     ----------
-    detected, reference : Footprints
+    detected, reference
+        As of `evaluate`.
     area : polygon, optional
     grid : Grid, optional
+    building_id : str, optional
     **parameters
         Given to the evaluators that have them.
 
     Returns
     -------
-    dict of str to Evaluation
-        By the name of the evaluator, the default one first.
+    Evaluations
+        A dictionary by the name of the evaluator, the default one first.
 
     Examples
     --------
@@ -137,20 +157,16 @@ def evaluate_all(
     >>> list(evaluate_all(houses, houses))[:3]
     ['threshold-free', 'boundary', 'iou']
     """
-    found = {}
+    (found,), truth = given_sets([detected], reference, area, grid, building_id=building_id)
+    results = Evaluations()
     for evaluator in all_evaluators(parameters):
-        _require_comparable(detected, reference, area, evaluator)
-        found[evaluator.name] = evaluator.evaluate(detected, reference, area=area, grid=grid)
-    return found
+        _require_comparable(found, truth.footprints, truth.area, evaluator)
+        results[evaluator.name] = evaluator.evaluate(found, truth.footprints, area=truth.area, grid=truth.grid)
+    return results
 
 
-def _require_comparable(detected: Any, reference: Any, area: Any, evaluator: Evaluator) -> None:
-    for footprints, role in ((detected, "detected"), (reference, "reference")):
-        if not isinstance(footprints, Footprints):
-            raise InputError(
-                f"{role} is {type(footprints).__name__}, not Footprints: read it with read_footprints or build it by "
-                "Footprints.of"
-            )
+def _require_comparable(detected: Footprints, reference: Footprints, area: Any, evaluator: Evaluator) -> None:
+    for footprints in (detected, reference):
         if len(footprints):
             require_metric(footprints.crs, footprints.source, heights=False)
     if area is not None:

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.display import Displayed
 from ..core.errors import InputError
 from ..scenes.geodata.footprints import Footprints
 
@@ -337,8 +338,8 @@ def _texts(values: Any) -> tuple[str, ...]:
     return tuple(values)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Verdicts:
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Verdicts(Displayed):
     """The verdicts of both sides with their footprints.
 
     Attributes
@@ -350,6 +351,8 @@ class Verdicts:
     detected, reference : Footprints
         What the rows of the tables are about.
     """
+
+    shown_by = "reports.notebook_view:verdicts_view"
 
     kinds: tuple[VerdictKind, ...]
     measures: tuple[Measure, ...]
@@ -370,6 +373,13 @@ class Verdicts:
                     f"the evaluator does not declare the verdict {min(unknown)!r} of {side}s: evaluate again with "
                     "'roofbench score'"
                 )
+
+    def __repr__(self) -> str:
+        sides = []
+        for side, table, _ in self.sides:
+            numbers = [f"{table.count(kind.key)} {kind.key}" for kind in self.kinds_of(side) if table.count(kind.key)]
+            sides.append(f"{len(table)} {side}s" + (f" ({', '.join(numbers)})" if numbers else ""))
+        return f"<Verdicts {', '.join(sides)}>"
 
     @property
     def sides(self) -> tuple[tuple[Side, VerdictTable, Footprints], ...]:
@@ -416,14 +426,6 @@ class Verdicts:
         return self._frame("reference")
 
     def _frame(self, side: Side) -> gpd.GeoDataFrame:
-        import geopandas
-        import pandas as pd
+        from ..scenes.geodata.frames import geo_frame
 
-        columns = {
-            name: pd.arrays.IntegerArray(column.data.copy(), np.ma.getmaskarray(column))
-            if np.ma.isMaskedArray(column) and np.issubdtype(column.dtype, np.integer)
-            else column
-            for name, column in self.columns(side).items()
-            if name != "geometry"
-        }
-        return geopandas.GeoDataFrame(columns, geometry=self.footprints(side).polygons, crs=self.crs)
+        return geo_frame(self.columns(side), self.footprints(side).polygons, self.crs)

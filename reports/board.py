@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import functools
+import html
 from collections.abc import Callable
 from dataclasses import fields
 from typing import TYPE_CHECKING, ParamSpec, Self
 
 from ..benchmark import session
 from ..benchmark.analysis.results import Leaderboard
-from .leaderboard_text import leaderboard_data, leaderboard_markdown, summary_caption, summary_table
+from .format import counted, index_name
+from .leaderboard_text import leaderboard_data, leaderboard_markdown, scene_table, summary_caption, summary_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,8 +45,22 @@ class Board(Leaderboard):
         return f"{summary_table(self).to_text()}\n{summary_caption(self)}."
 
     def _repr_html_(self) -> str:
-        """Return the table for a notebook."""
-        return summary_table(self).to_html()
+        """Return the table for a notebook, with what it is of, its notes, and the values by scene."""
+        parts = [f"<b>{html.escape(self.title)}</b>", summary_table(self).to_html()]
+        lines = [summary_caption(self), *self.notes]
+        lines += [
+            f"{run.status}: {run.label} on {run.scene}, seed {run.seed}: {run.reason}" for run in self.unsuccessful
+        ]
+        parts += [f'<div style="font-size:90%">{html.escape(line)}.</div>' for line in lines]
+        if len(self.by_scene) > 1:
+            parts.append(f"<details><summary>by scene</summary>{scene_table(self).to_html()}</details>")
+        return "".join(parts)
+
+    def __repr__(self) -> str:
+        detectors = len(dict.fromkeys(entry.label for entry in self.entries))
+        first = next((entry.label for entry in self.entries if entry.rank == 1), None)
+        leads = f", {first} first by {index_name(self.rank_by)}" if first else ""
+        return f"<Leaderboard {counted(detectors, 'detector')} on {counted(len(self.scenes), 'scene')}{leads}>"
 
 
 def _shown(compute: Callable[P, Leaderboard]) -> Callable[P, Board]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from typing import Literal, TypeAlias
 
 from ..evaluators.uncertainty.paired import Difference, Fate, PairedComparison
@@ -10,7 +11,7 @@ from .evaluation_text import described
 from .format import column_title, counted, interval_text, number_text, value_text
 from .tables import Column, Table, escaped_markdown
 
-__all__ = ["FATE_WORDS", "Form", "format_pair", "objects_line"]
+__all__ = ["FATE_WORDS", "Form", "differences_table", "fates_table", "format_pair", "objects_line"]
 
 Form: TypeAlias = Literal["table", "json", "csv", "md"]
 
@@ -52,9 +53,9 @@ def format_pair(found: PairedComparison, form: Form, *, names: tuple[str, str, s
     sources = [f"{letter}: {name}" for letter, name in zip(("A", "B", "reference"), names, strict=True)]
     lines = [", ".join(escaped_markdown(head) if markdown else head for head in sources), described(found.first), ""]
     if found.objects:
-        lines += [written(_fates(found)), "", objects_line(found), ""]
+        lines += [written(fates_table(found)), "", objects_line(found), ""]
     main = [difference for difference in found.differences if difference.index.main]
-    lines += [written(_differences(found, main)), "", *_notes(found, markdown=markdown)]
+    lines += [written(differences_table(found, main)), "", *_notes(found, markdown=markdown)]
     return "\n".join(lines)
 
 
@@ -65,7 +66,8 @@ def objects_line(found: PairedComparison) -> str:
     return f"McNemar's exact test of the objects that one alone finds: p = {found.p_value:.2g}, {found.conclusion}"
 
 
-def _fates(found: PairedComparison) -> Table:
+def fates_table(found: PairedComparison) -> Table:
+    """Return how many references both find, only one, or neither."""
     total = sum(number for fate, number in found.objects.items() if fate != "left out")
     rows = []
     for fate, number in found.objects.items():
@@ -76,7 +78,8 @@ def _fates(found: PairedComparison) -> Table:
     return Table.of((Column("references", "left"), Column("number"), Column("share")), rows)
 
 
-def _differences(found: PairedComparison, chosen: list[Difference]) -> Table:
+def differences_table(found: PairedComparison, chosen: Iterable[Difference]) -> Table:
+    """Return the value of each index in A and in B, and the difference with its interval."""
     columns = [
         Column("index", "left"),
         *(Column(title) for title in ("A", "B", "B − A", f"{found.level:g} %")),

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack, runtime_chec
 import numpy as np
 import shapely
 
+from ..core.display import Displayed
 from ..core.errors import InputError, MissingInputError
 from .geodata.footprints import Footprints
 from .geodata.points import PointCloud
@@ -66,7 +67,7 @@ class LayerFiles(Protocol):
         """Return a text that changes when the files that hold this part change; they are not read."""
 
 
-class Scene:
+class Scene(Displayed):
     """A place with its measurements and its ground truth.
 
     Parameters
@@ -83,6 +84,8 @@ class Scene:
     facts : mapping, optional
         Provenance that JSON can hold: source, licence, generator parameters.
     """
+
+    shown_by = "reports.notebook_view:scene_view"
 
     def __init__(
         self,

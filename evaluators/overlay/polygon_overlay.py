@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...scenes.geodata.footprints import polygonal_part
+from ...scenes.geodata.polygon_repair import polygonal_part
 
 __all__ = ["common_ground", "overlay_areas"]
 

@@ -41,7 +41,7 @@ from .verdicts import MEASURES, VERDICT_KINDS, find_verdicts
 __all__ = ["ThresholdFree", "ThresholdFreeEvaluation"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ThresholdFreeEvaluation(Evaluation):
     """Result of the threshold-free evaluation; fractions, metres, None where undefined.
 

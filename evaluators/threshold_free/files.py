@@ -25,8 +25,9 @@ from ...core.errors import InputError, OutputError, RoofbenchError
 from ...core.package import FOLDER, VERSION
 from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprint_stream import FootprintStream, open_stream
-from ...scenes.geodata.footprints import Footprints, Repair
+from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.outline_batch import OutlineBatch
+from ...scenes.geodata.polygon_repair import Repair
 from ..overlay.left_out import repair_notes
 from ..overlay.outline_store import Division, OutlineStore
 from ..verdict_table import VerdictTable

@@ -20,6 +20,7 @@ from ...core.resampling import expanded_level, resampling_weights
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..base import Evaluation, Evaluator
+from ..given_footprints import GivenFootprints, GivenReference, given_sets
 from ..registry import DEFAULT, make_evaluator
 from ..tally import Tallies
 from .blocks import Blocks, spatial_blocks
@@ -76,8 +77,8 @@ class Intervals:
 
 
 def block_intervals(
-    detected: Footprints,
-    reference: Footprints,
+    detected: GivenFootprints,
+    reference: GivenReference,
     *,
     evaluator: str | Evaluator = DEFAULT,
     area: shapely.Geometry | None = None,
@@ -89,8 +90,9 @@ def block_intervals(
 
     Parameters
     ----------
-    detected, reference : Footprints
-        In one projected CRS, metres.
+    detected : Footprints, GeoDataFrame, GeoSeries, path, or iterable of polygons
+    reference : the same, or Scene
+        Both in one projected CRS, metres.
     evaluator : str or Evaluator
     area : polygon, optional
         Evaluation area.
@@ -119,9 +121,10 @@ def block_intervals(
     """
     require_level(level)
     chosen = make_evaluator(evaluator)
-    blocks = spatial_blocks([detected, reference])
-    every = block_tallies(chosen, (detected, reference), (0, 1), blocks, area=area, grid=grid)
-    whole = chosen.evaluate(detected, reference, area=area, grid=grid)
+    (found,), (truth, area, grid) = given_sets([detected], reference, area, grid)
+    blocks = spatial_blocks([found, truth])
+    every = block_tallies(chosen, (found, truth), (0, 1), blocks, area=area, grid=grid)
+    whole = chosen.evaluate(found, truth, area=area, grid=grid)
     values = resampled_values(whole, every, resamples)
     return Intervals(
         level=level,

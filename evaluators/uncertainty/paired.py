@@ -23,12 +23,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...core.display import Displayed
 from ...core.errors import InputError
 from ...scenes.geodata.crs import common_crs
-from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..base import Evaluation, Evaluator
 from ..comparison import evaluate
+from ..given_footprints import GivenFootprints, GivenReference, given_sets
 from ..index import Index
 from ..registry import DEFAULT, make_evaluator
 from ..verdict_table import Side, Verdicts
@@ -83,8 +84,8 @@ class Difference:
         return "B better" if (low > 0) == (self.index.better == "higher") else "A better"
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PairedComparison:
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class PairedComparison(Displayed):
     """Two detections of one place, evaluated against one reference.
 
     Attributes
@@ -101,6 +102,8 @@ class PairedComparison:
         Of the paired bootstrap.
     """
 
+    shown_by = "reports.notebook_view:pair_view"
+
     first: Evaluation
     second: Evaluation
     differences: tuple[Difference, ...]
@@ -109,6 +112,10 @@ class PairedComparison:
     blocks: int
     groups: int
     resamples: int
+
+    def __repr__(self) -> str:
+        objects = ", ".join(f"{number} {fate}" for fate, number in self.objects.items() if number)
+        return f"<PairedComparison by {self.evaluator.name}: {objects or 'no verdicts'}>"
 
     @property
     def evaluator(self) -> Evaluator:
@@ -175,9 +182,9 @@ class PairedComparison:
 
 
 def compare(
-    first: Footprints,
-    second: Footprints,
-    reference: Footprints,
+    first: GivenFootprints,
+    second: GivenFootprints,
+    reference: GivenReference,
     *,
     evaluator: str | Evaluator = DEFAULT,
     area: shapely.Geometry | None = None,
@@ -189,9 +196,9 @@ def compare(
 
     Parameters
     ----------
-    first, second : Footprints
+    first, second : Footprints, GeoDataFrame, GeoSeries, path, or iterable of polygons
         A and B, in the CRS of the reference.
-    reference : Footprints
+    reference : the same, or Scene
     evaluator : str or Evaluator
         Name, ``name[parameter=value]``, or an evaluator.
     area : polygon, optional
@@ -221,15 +228,17 @@ def compare(
     """
     require_level(interval)
     chosen = make_evaluator(evaluator, parameters)
-    evaluations = [evaluate(found, reference, evaluator=chosen, area=area, grid=grid) for found in (first, second)]
-    if len(first) and len(second):
-        common_crs(first.crs, second.crs, (first.source, second.source))
-    blocks = spatial_blocks([first, second, reference])
+    sets = given_sets([first, second], reference, area, grid, roles=("A", "B"))
+    (a, b), (truth, area, grid) = sets
+    evaluations = [evaluate(found, truth, evaluator=chosen, area=area, grid=grid) for found in (a, b)]
+    if len(a) and len(b):
+        common_crs(a.crs, b.crs, (a.source, b.source))
+    blocks = spatial_blocks([a, b, truth])
     resampled = [
         resampled_values(
-            whole, block_tallies(chosen, (found, reference), (place, 2), blocks, area=area, grid=grid), RESAMPLES
+            whole, block_tallies(chosen, (found, truth), (place, 2), blocks, area=area, grid=grid), RESAMPLES
         )
-        for place, (whole, found) in enumerate(zip(evaluations, (first, second), strict=True))
+        for place, (whole, found) in enumerate(zip(evaluations, (a, b), strict=True))
     ]
     one, two = evaluations
     return PairedComparison(

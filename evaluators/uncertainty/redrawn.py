@@ -20,6 +20,7 @@ from ...core.errors import ParameterError
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..base import Evaluator
+from ..given_footprints import GivenFootprints, GivenReference, given_sets
 from ..registry import DEFAULT, make_evaluator
 
 __all__ = ["REDRAWS", "Redraws", "changes_of", "redraw", "redraw_changes", "require_error"]
@@ -115,8 +116,8 @@ def _ids(footprints: Footprints, found: Footprints) -> NDArray[Any] | None:
 
 
 def redraw_changes(
-    detected: Footprints,
-    reference: Footprints,
+    detected: GivenFootprints,
+    reference: GivenReference,
     *,
     error: float,
     evaluator: str | Evaluator = DEFAULT,
@@ -129,7 +130,8 @@ def redraw_changes(
 
     Parameters
     ----------
-    detected, reference : Footprints
+    detected : Footprints, GeoDataFrame, GeoSeries, path, or iterable of polygons
+    reference : the same, or Scene
     error : float
         Standard deviation of each coordinate of a redrawn corner, m; see `redraw`.
     evaluator : str or Evaluator
@@ -153,10 +155,11 @@ def redraw_changes(
     """
     require_error(error)
     chosen = make_evaluator(evaluator)
-    whole = chosen.evaluate(detected, reference, area=area, grid=grid)
+    (found,), (truth, area, grid) = given_sets([detected], reference, area, grid)
+    whole = chosen.evaluate(found, truth, area=area, grid=grid)
     stream = np.random.default_rng(seed)
-    every = [chosen.evaluate(detected, redraw(reference, error, stream), area=area, grid=grid) for _ in range(redraws)]
-    return Redraws(error=error, redraws=redraws, changes=changes_of(whole.values, [found.values for found in every]))
+    every = [chosen.evaluate(found, redraw(truth, error, stream), area=area, grid=grid) for _ in range(redraws)]
+    return Redraws(error=error, redraws=redraws, changes=changes_of(whole.values, [one.values for one in every]))
 
 
 def require_error(error: float) -> None:

@@ -8,68 +8,44 @@ building id
     Label shared by the footprints that are parts of one building (L, T, U, C shapes).
 centre
     Of a convex quadrilateral without holes: the intersection of its diagonals; of anything else: the area centroid.
-repair
-    What was changed or dropped to make a footprint usable; nothing is changed silently.
 
 Source of the definitions: Awrangjeb, Ravanbakhsh & Fraser (2010), section 4.1.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from ...core.display import Displayed
 from ...core.errors import InputError
-from .crs import crs_label
+from ...core.registry import nearest_hint
+from .crs import crs_label, file_crs, named_crs
+from .polygon_repair import Repair, repaired
 from .ring_measures import centres_of, quadrilaterals_of
 from .vector_columns import labels_of
 
-__all__ = ["Footprints", "Repair", "polygonal_part"]
+if TYPE_CHECKING:
+    import geopandas as gpd
+    from matplotlib.axes import Axes
+
+__all__ = ["Footprints"]
 
 #: Widest gap that is closed between footprints, metres: no two houses so far apart are one block.
 _WIDEST_GAP = 100.0
-#: Coordinates of no system on earth, metres; squares of such numbers are not finite.
-_FARTHEST = 1e9
-
-#: Geometries that a thread tests at a time, and number from which on compiled code tests them first.
-_CHUNK, _MANY = 1 << 14, 50_000
-
 #: Stands for "number the rows from 0".
 _UNNUMBERED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
 
-@dataclass(frozen=True)
-class Repair:
-    """One footprint that was repaired or left out on the way in.
-
-    Attributes
-    ----------
-    id : int
-        Row of the footprint in its source, from 0.
-    problem : str
-        What was wrong: ``"Self-intersection at (3, 4)"``, ``"empty"``, ``"zero area"``, ``"not a polygon: Point"``.
-    action : str
-        ``"repaired"`` or ``"left out"``.
-    """
-
-    id: int
-    problem: str
-    action: str
-
-    def __str__(self) -> str:
-        return f"feature {self.id}: {self.problem}: {self.action}"
-
-
 @dataclass(frozen=True, eq=False)
-class Footprints:
+class Footprints(Displayed):
     """A set of footprints with a common CRS.
 
     Build it by `Footprints.of`, which repairs and checks; the constructor takes what is already clean.
@@ -93,6 +69,8 @@ class Footprints:
     source : str
         File or maker, for messages.
     """
+
+    shown_by = "reports.notebook_view:footprints_view"
 
     polygons: NDArray[np.object_]
     building_ids: NDArray[Any] | None = None
@@ -134,7 +112,7 @@ class Footprints:
         (2, ['feature 0: Self-intersection[1 1]: repaired', 'feature 1: empty: left out'])
         """
         geometries = _as_geometry_array(polygons)
-        clean, repairs, kept = _repaired(geometries)
+        clean, repairs, kept = repaired(geometries)
         columns = {}
         for name, column in (attributes or {}).items():
             values = column if isinstance(column, np.ndarray) else np.asarray(column)  # keeps the mask of a masked one
@@ -170,6 +148,50 @@ class Footprints:
         return cls.of(polygons, crs=crs, building_ids=building_ids, **more)
 
     @classmethod
+    def from_geopandas(
+        cls,
+        frame: gpd.GeoDataFrame | gpd.GeoSeries,
+        *,
+        building_id: str | None = None,
+        crs: str | None = None,
+        source: str = "geopandas",
+    ) -> Footprints:
+        """Build from a GeoDataFrame or GeoSeries; CRS and columns are kept.
+
+        Parameters
+        ----------
+        frame : GeoDataFrame or GeoSeries
+        building_id : str, optional
+            Column whose equal values mark the parts of one building; a column called ``building_id`` is used where
+            there is one.
+        crs : str, optional
+            CRS to assign where the frame has none or a wrong one; coordinates are not changed.
+        source : str
+            Name for messages.
+        """
+        try:
+            geometry = frame.geometry
+        except AttributeError:
+            raise InputError(f"{source}: the frame has no active geometry: choose it by set_geometry") from None
+        names = [name for name in getattr(frame, "columns", ()) if name != geometry.name]
+        columns = {str(name): frame[name].to_numpy() for name in names}
+        if building_id is None and "building_id" in columns:
+            building_id = "building_id"
+        if building_id is not None and building_id not in columns:
+            raise InputError(
+                f"{source}: no column {building_id!r}{nearest_hint(building_id, columns)}; "
+                f"it has {', '.join(columns) or 'none'}"
+            )
+        own = None if frame.crs is None else file_crs(frame.crs)
+        return cls.of(
+            geometry.to_numpy(),
+            building_ids=None if building_id is None else columns[building_id],
+            crs=own if crs is None else named_crs(crs),
+            attributes=columns,
+            source=source,
+        )
+
+    @classmethod
     def empty(cls, *, crs: str | None = None, source: str = "footprints") -> Footprints:
         """Return a set of no footprints: a valid result."""
         return cls(polygons=np.empty(0, dtype=object), crs=crs, source=source)
@@ -178,7 +200,44 @@ class Footprints:
         return len(self.polygons)
 
     def __repr__(self) -> str:
-        return f"<Footprints {len(self)} polygons, {crs_label(self.crs)}, {self.source}>"
+        plural = "s" * (len(self) != 1)
+        return f"<Footprints {len(self)} polygon{plural}, {crs_label(self.crs)}, {PurePath(self.source).name}>"
+
+    def __iter__(self) -> Iterator[shapely.Geometry]:
+        return iter(self.polygons)
+
+    @overload
+    def __getitem__(self, index: int) -> shapely.Geometry: ...
+
+    @overload
+    def __getitem__(self, index: slice | NDArray[Any] | list[Any]) -> Footprints: ...
+
+    def __getitem__(self, index: int | slice | NDArray[Any] | list[Any]) -> shapely.Geometry | Footprints:
+        """Return the polygon at an integer, or the footprints of a slice, mask or list of integers.
+
+        Examples
+        --------
+        >>> pair = Footprints.of([shapely.box(0, 0, 1, 1), shapely.box(2, 0, 4, 1)])
+        >>> pair[1].area, pair[:1], pair[pair.areas > 5]
+        (2.0, <Footprints 1 polygon, no CRS, footprints>, <Footprints 0 polygons, no CRS, footprints>)
+        """
+        if isinstance(index, int | np.integer):
+            return self.polygons[index]
+        return self.take(np.arange(len(self))[index])
+
+    def to_geopandas(self) -> gpd.GeoDataFrame:
+        """Return a GeoDataFrame with CRS, the attributes as columns, and ``building_id`` where there are any."""
+        from .frames import geo_frame
+
+        own = {} if self.building_ids is None else {"building_id": self.building_ids}
+        return geo_frame({**own, **self.attributes}, self.polygons, self.crs)
+
+    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
+        """Draw the outlines with matplotlib and return the axes; `style` is that of `GeoDataFrame.plot`."""
+        look = {"facecolor": "#0072B255", "edgecolor": "#0072B2", "linewidth": 0.8, **style}
+        axes: Axes = self.to_geopandas().plot(ax=ax, **look)
+        axes.set_aspect("equal")
+        return axes
 
     def take(self, index: NDArray[Any]) -> Footprints:
         """Return the footprints at `index` (integers or a mask)."""
@@ -288,95 +347,3 @@ def _as_column(values: Any) -> NDArray[Any]:
     items = list(values)
     plain = all(isinstance(item, str) for item in items) or all(isinstance(item, int | np.integer) for item in items)
     return np.array(items) if plain and items else np.array(items, dtype=object)
-
-
-def _repaired(
-    geometries: NDArray[np.object_],
-) -> tuple[NDArray[np.object_], tuple[Repair, ...], NDArray[np.bool_]]:
-    """Return clean polygons, the repairs, and the mask of rows that were kept."""
-    if shapely.has_z(geometries).any() or shapely.has_m(geometries).any():
-        geometries = shapely.force_2d(geometries)
-    else:
-        geometries = geometries.copy()
-    repairs: list[Repair] = []
-    kept = np.ones(len(geometries), dtype=bool)
-
-    def leave_out(rows: NDArray[np.bool_], problem: str) -> None:
-        for row in np.flatnonzero(rows & kept):
-            repairs.append(Repair(int(row), problem, "left out"))
-        kept[rows] = False
-
-    leave_out(shapely.is_missing(geometries), "no geometry")
-    leave_out(shapely.is_empty(geometries), "empty")
-    polygonal = np.isin(shapely.get_type_id(geometries), (3, 6, 7))
-    for row in np.flatnonzero(kept & ~polygonal):
-        repairs.append(Repair(int(row), f"not a polygon: {geometries[row].geom_type}", "left out"))
-    kept &= polygonal
-    bounds = shapely.bounds(geometries)
-    finite = np.isfinite(bounds).all(axis=1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        finite[kept] &= np.isfinite(shapely.area(geometries[kept]))
-    leave_out(~finite, "coordinates that are not finite")
-    leave_out(finite & (np.abs(bounds) > _FARTHEST).any(axis=1), f"coordinates beyond {_FARTHEST:g} m")
-
-    suspect = np.flatnonzero(kept)[~_are_valid(geometries[kept])]
-    suspect = np.union1d(suspect, np.flatnonzero(kept & (shapely.get_type_id(geometries) == 7)))
-    for row in suspect:
-        collection = geometries[row].geom_type == "GeometryCollection"
-        problem = "a collection of geometries" if collection else shapely.is_valid_reason(geometries[row])
-        # "structure" joins overlapping parts; "linework" would make holes where they overlap.
-        repaired = shapely.make_valid(geometries[row], method="structure", keep_collapsed=False)
-        geometries[row] = polygonal_part(repaired)
-        usable = not geometries[row].is_empty
-        repairs.append(Repair(int(row), problem, "repaired" if usable else "left out"))
-        kept[row] = usable
-    single = kept & (shapely.get_type_id(geometries) == 6) & (shapely.get_num_geometries(geometries) == 1)
-    geometries[single] = shapely.get_geometry(geometries[single], 0)
-    flat = np.zeros(len(geometries), dtype=bool)
-    flat[kept] = ~(shapely.area(geometries[kept]) > 0)
-    leave_out(flat, "zero area")
-    repairs.sort(key=lambda repair: repair.id)
-    return geometries[kept], tuple(repairs), kept
-
-
-def _are_valid(geometries: NDArray[np.object_]) -> NDArray[np.bool_]:
-    """Return which polygons are valid; many of them are tested by several threads.
-
-    Of very many, those that compiled code recognises as valid need no test by GEOS.
-    """
-    if len(geometries) <= _CHUNK:
-        return np.asarray(shapely.is_valid(geometries))
-    valid = np.zeros(len(geometries), dtype=bool)
-    if len(geometries) > _MANY:
-        from .simple_rings import clearly_simple  # loading the compiled code takes a moment
-
-        single = (shapely.get_type_id(geometries) == 3) & (shapely.get_num_interior_rings(geometries) == 0)
-        start = np.concatenate([[0], np.cumsum(shapely.get_num_coordinates(geometries[single]))]).astype(np.int64)
-        valid[single] = clearly_simple(start, shapely.get_coordinates(geometries[single]))
-    rest = np.flatnonzero(~valid)
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        parts = pool.map(shapely.is_valid, np.array_split(geometries[rest], len(rest) // _CHUNK + 1))
-        valid[rest] = np.concatenate(list(parts))
-    return valid
-
-
-def polygonal_part(geometry: shapely.Geometry, *, grid_size: float | None = None) -> shapely.Geometry:
-    """Return what has area in a geometry; an empty multipolygon where nothing has.
-
-    Parameters
-    ----------
-    geometry : shapely.Geometry
-    grid_size : float, optional
-        Grid of the coordinates, m, for results of overlays on a grid.
-
-    Examples
-    --------
-    >>> mixed = shapely.GeometryCollection([shapely.box(0, 0, 1, 1), shapely.LineString([(1, 1), (2, 2)])])
-    >>> polygonal_part(mixed).geom_type, polygonal_part(shapely.Point(0, 0)).wkt
-    ('Polygon', 'MULTIPOLYGON EMPTY')
-    """
-    parts = shapely.get_parts(geometry)
-    while (shapely.get_type_id(parts) > 3).any():  # multipolygons and collections, nested to any depth
-        parts = shapely.get_parts(parts)
-    polygons = parts[shapely.get_type_id(parts) == 3]
-    return shapely.union_all(polygons, grid_size=grid_size) if len(polygons) else shapely.MultiPolygon()

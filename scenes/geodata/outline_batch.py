@@ -8,7 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .footprints import Footprints, Repair
+from .footprints import Footprints
+from .polygon_repair import Repair
 from .ring_measures import centres_of, quadrilaterals_of
 from .simple_rings import PlainOutlines
 

@@ -15,7 +15,7 @@ from ...core.errors import InputError, OutputError
 from ...core.inputs import require_file
 from ...core.plain_paths import plain_path
 from .crs import file_crs
-from .footprints import Repair
+from .polygon_repair import Repair
 from .wkb import geometries_of_wkb
 
 __all__ = ["read_parquet", "write_parquet"]

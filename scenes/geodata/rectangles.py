@@ -16,7 +16,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from .footprints import Footprints, polygonal_part
+from .footprints import Footprints
+from .polygon_repair import polygonal_part
 
 __all__ = ["RectangleFit", "as_rectangles", "decompose"]
 

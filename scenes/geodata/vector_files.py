@@ -23,10 +23,11 @@ from ...core.output import whole_file
 from ...core.plain_paths import plain_path, plain_target
 from ...core.registry import nearest_hint
 from .crs import common_crs, crs_label, file_crs, named_crs, parse_crs, require_metric, same_crs
-from .footprints import Footprints, Repair
+from .footprints import Footprints
 from .label_images import ENDINGS, read_labels
 from .ogr_layers import layer_names, quiet, read_layer
 from .parquet_files import read_parquet, write_parquet
+from .polygon_repair import Repair
 from .vector_columns import storable_columns
 from .wkb import geometries_of_wkb
 

@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from .footprints import Repair
+from .polygon_repair import Repair
 
 __all__ = ["geometries_of_wkb"]
 

@@ -40,11 +40,6 @@ def test_a_pooled_evaluation_says_how_areas_were_measured():
     assert rb.pool([exact, counted]).notes[1] == "areas counted in pixels in 1 of 2 scenes, exact in the others"
 
 
-def test_a_list_of_polygons_is_no_footprint_set():
-    with pytest.raises(InputError, match=r"reference is list, not Footprints: .* Footprints\.of"):
-        rb.evaluate(HOUSES, [HOUSE])
-
-
 def test_all_evaluators_compare_the_same_sets_with_the_parameters_that_they_have():
     found = evaluate_all(HOUSES, HOUSES, matching="one-pass", minimum_area=5)
     assert set(found) == set(EVALUATORS.names())

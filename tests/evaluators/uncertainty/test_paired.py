@@ -99,5 +99,5 @@ def test_different_systems_and_other_things_are_refused():
     there, here = (rb.Footprints.of(HOUSES.polygons, crs=crs) for crs in ("EPSG:25832", "EPSG:25833"))
     with pytest.raises(CRSError):
         compare(there, here, there)
-    with pytest.raises(InputError, match="not Footprints"):
-        compare([], HOUSES, HOUSES)
+    with pytest.raises(InputError, match="A is int, not footprints"):
+        compare(3, HOUSES, HOUSES)
