@@ -23,7 +23,6 @@ from .crs import file_crs, named_crs, require_metric
 from .footprints import Footprints
 from .ogr_layers import quiet
 from .outline_batch import OutlineBatch
-from .simple_rings import plain_outlines
 from .vector_files import DRIVERS, building_column, named_or_none, readable_layer, split_layer
 from .wkb import geometries_of_wkb
 
@@ -83,6 +82,8 @@ class FootprintStream:
 
         Ids and repairs count the features of the file. The outlines and repairs are those of `Footprints.of`.
         """
+        from .simple_rings import plain_outlines  # loading the compiled code takes a moment
+
         first = 0
         for batch in self.batches([] if self.building_id is None else [self.building_id]):
             column = self.wkb(batch)

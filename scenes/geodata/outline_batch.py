@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from .footprints import Footprints
 from .polygon_repair import Repair
 from .ring_measures import centres_of, quadrilaterals_of
-from .simple_rings import PlainOutlines
+
+if TYPE_CHECKING:  # its compiled code takes a moment to load
+    from .simple_rings import PlainOutlines
 
 __all__ = ["OutlineBatch"]
 
