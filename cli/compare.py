@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from .evaluation_in_parts import InParts, compare_in_parts, is_large
 from .footprint_inputs import check_targets, print_problems, read_truth, short_name
 from .options import (
     FORMAT_HELP,
@@ -16,7 +17,9 @@ from .options import (
     EvaluatorOption,
     JoinGapsOption,
     OverwriteOption,
+    PartsOption,
     QuietOption,
+    SchedulerOption,
 )
 
 __all__ = ["compare"]
@@ -50,6 +53,8 @@ def compare(
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE", help="Map of what only one finds (.png, .svg, .pdf).")
     ] = None,
+    parts: PartsOption = None,
+    scheduler: SchedulerOption = None,
     overwrite: OverwriteOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -59,7 +64,7 @@ def compare(
     only one finds are tested by McNemar's exact test. Two results stores are compared by 'roofbench report --against'.
     """
     from ..core.errors import InputError, ParameterError, UnsupportedError
-    from ..evaluators.registry import ALL, DEFAULT
+    from ..evaluators.registry import ALL, DEFAULT, make_evaluator
     from ..evaluators.uncertainty.paired import compare as compared
     from ..reports.pair_text import format_pair
     from ..scenes.geodata.vector_files import read_footprints
@@ -69,6 +74,18 @@ def compare(
     if building_id is not None and join_gaps is not None:
         raise InputError("blocks of joined footprints have no building ids: set building_id= or join_gaps=, not both")
     check_targets(verdicts, plot, inputs=(first, second, reference, evaluation_area), overwrite=overwrite)
+    names = (short_name(first), short_name(second), short_name(reference))
+    whole = {"evaluation_area=": evaluation_area, "join_gaps=": join_gaps, "plot=": plot}
+    needs = [name for name, value in whole.items() if value is not None]
+    asked = "parts=" if parts is not None else "scheduler=" if scheduler is not None else None
+    if asked and needs:
+        raise InputError(f"{needs[0]} needs whole files in memory: leave it out, or leave out {asked}")
+    paths = first, second, reference
+    if asked or (not needs and evaluator in (None, DEFAULT) and is_large(paths)):
+        options = InParts(parts, scheduler, building_id, crs, verdicts, overwrite, quiet)
+        result = compare_in_parts(make_evaluator(evaluator, {}), paths, options, interval=interval)
+        typer.echo(format_pair(result, form, names=names))
+        return
     one, two = (read_footprints(path, crs=crs) for path in (first, second))
     truth = read_truth(reference, building_id=building_id, crs=crs, evaluation_area=evaluation_area)
     print_problems([one, two], truth, evaluation_area=evaluation_area, quiet=quiet)
@@ -83,7 +100,6 @@ def compare(
         grid=truth.grid,
         interval=interval,
     )
-    names = (short_name(first), short_name(second), short_name(reference))
     if found.fates is None and (verdicts is not None or plot is not None):
         raise UnsupportedError(
             f"the evaluator {found.evaluator.name!r} gives no verdicts: leave out verdicts= and plot="

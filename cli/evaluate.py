@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from .evaluation_in_parts import evaluate_in_parts, is_large
+from .evaluation_in_parts import InParts, evaluate_in_parts, is_large
 from .footprint_inputs import check_targets, print_problems, read_truth, short_name
 from .options import (
     FORMAT_HELP,
@@ -19,7 +19,9 @@ from .options import (
     IntervalOption,
     JoinGapsOption,
     OverwriteOption,
+    PartsOption,
     QuietOption,
+    SchedulerOption,
 )
 
 if TYPE_CHECKING:
@@ -80,16 +82,8 @@ def evaluate(
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE", help="Map of the verdicts (.png, .svg, .pdf).")
     ] = None,
-    parts: Annotated[
-        int | None,
-        typer.Option(
-            "--parts",
-            min=1,
-            metavar="N",
-            help="Compare files that are too large for the memory in about N parts; same result. From 2 million "
-            "footprints on, the number of parts is chosen.",
-        ),
-    ] = None,
+    parts: PartsOption = None,
+    scheduler: SchedulerOption = None,
     overwrite: OverwriteOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -123,19 +117,12 @@ def evaluate(
         f"evaluator={ALL}": every or None,
     }
     needs = [name for name, value in whole.items() if value is not None]
-    if parts is not None and needs:
-        raise InputError(f"{needs[0]} needs whole files in memory: leave it out, or leave out parts=")
-    if parts is not None or (not needs and evaluator in (None, DEFAULT) and is_large((detected, reference))):
-        result = evaluate_in_parts(
-            scorers[0],
-            (detected, reference),
-            parts=parts,
-            building_id=building_id,
-            crs=crs,
-            verdicts=verdicts,
-            overwrite=overwrite,
-            quiet=quiet,
-        )
+    asked = "parts=" if parts is not None else "scheduler=" if scheduler is not None else None
+    if asked and needs:
+        raise InputError(f"{needs[0]} needs whole files in memory: leave it out, or leave out {asked}")
+    if asked or (not needs and evaluator in (None, DEFAULT) and is_large((detected, reference))):
+        options = InParts(parts, scheduler, building_id, crs, verdicts, overwrite, quiet)
+        result = evaluate_in_parts(scorers[0], (detected, reference), options)
         typer.echo(format_evaluation(result, form, title=f"{short_name(detected)} against {short_name(reference)}"))
         return
     found = read_footprints(detected, crs=crs)

@@ -1,21 +1,24 @@
-"""``roofbench evaluate`` of files that are too large for the memory: in parts, with a work folder and progress."""
+"""``evaluate`` and ``compare`` of files that are too large for the memory: in parts, with a work folder."""
 
 from __future__ import annotations
 
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
 if TYPE_CHECKING:
     from ..evaluators.base import Evaluation, Evaluator
+    from ..evaluators.in_parts import ThresholdFree
+    from ..evaluators.uncertainty.paired import PairedComparison
+    from ..scenes.geodata.footprint_stream import FootprintStream
 
-__all__ = ["evaluate_in_parts", "is_large"]
+__all__ = ["InParts", "compare_in_parts", "evaluate_in_parts", "is_large"]
 
 #: Footprints of a file from which on two files are compared in parts.
 _MANY = 2_000_000
@@ -23,8 +26,8 @@ _MANY = 2_000_000
 _LARGE_FILE = 50_000_000
 
 
-def is_large(paths: tuple[str, str]) -> bool:
-    """Return whether a file holds so many footprints that both are compared in parts."""
+def is_large(paths: Sequence[str]) -> bool:
+    """Return whether a file holds so many footprints that all are compared in parts."""
     from ..core.errors import RoofbenchError
     from ..scenes.geodata.vector_files import split_layer
 
@@ -39,53 +42,105 @@ def is_large(paths: tuple[str, str]) -> bool:
         return False  # problems of the file are reported where it is read
 
 
-def evaluate_in_parts(
-    evaluator: Evaluator,
-    paths: tuple[str, str],
-    *,
-    parts: int | None,
-    building_id: str | None,
-    crs: str | None,
-    verdicts: Path | None,
-    overwrite: bool,
-    quiet: bool,
-) -> Evaluation:
+class InParts(NamedTuple):
+    """Options of a comparison in parts, as on the command line."""
+
+    parts: int | None
+    scheduler: str | None
+    building_id: str | None
+    crs: str | None
+    verdicts: Path | None
+    overwrite: bool
+    quiet: bool
+
+
+def evaluate_in_parts(evaluator: Evaluator, paths: tuple[str, str], options: InParts) -> Evaluation:
     """Compare two files in parts, and write the verdicts.
 
     The work folder lies beside the file of the verdicts (else among temporary files). An interrupted evaluation keeps
     it and continues from it; it is removed at the end.
     """
-    from ..core.errors import InputError, UnsupportedError
-    from ..evaluators.in_parts import ThresholdFree, evaluate_files
-    from ..reports.verdict_stream import check_streamed_output, write_verdict_stream
-    from ..scenes.geodata.footprint_stream import open_stream
+    from ..evaluators.in_parts import evaluate_files
+    from ..reports.verdict_stream import write_verdict_stream
+
+    chosen = _able(evaluator)
+    detected, reference = _streams(paths, options)
+    with _running(options) as (work, execution):
+        comparison = evaluate_files(chosen, (detected, reference), work, **execution)
+        if options.verdicts is not None:
+            execution["say"](f"writing {options.verdicts}")
+            write_verdict_stream(comparison, options.verdicts, overwrite=options.overwrite)
+        return comparison.evaluation
+
+
+def compare_in_parts(
+    evaluator: Evaluator, paths: tuple[str, str, str], options: InParts, *, interval: float
+) -> PairedComparison:
+    """Compare two detections of one place in parts, and write the layers; see `evaluate_in_parts`."""
+    from ..evaluators.uncertainty.paired_files import compare_files
+    from ..reports.pair_stream import write_pair_stream
+
+    chosen = _able(evaluator)
+    one, two, reference = _streams(paths, options)
+    with _running(options) as (work, execution):
+        found = compare_files(chosen, (one, two, reference), work, interval=interval, **execution)
+        if options.verdicts is not None:
+            execution["say"](f"writing {options.verdicts}")
+            write_pair_stream(found, options.verdicts, overwrite=options.overwrite)
+        return found.comparison
+
+
+def _able(evaluator: Evaluator) -> ThresholdFree:
+    """Return the evaluator, or raise `UnsupportedError` where it compares whole files only."""
+    from ..core.errors import UnsupportedError
+    from ..evaluators.in_parts import ThresholdFree
 
     if not isinstance(evaluator, ThresholdFree):
         raise UnsupportedError(
             f"the evaluator {evaluator.name!r} compares whole files only: leave out parts=, or use "
             f"{ThresholdFree.name!r}"
         )
-    if Path(paths[1]).is_dir():
-        raise InputError(f"{paths[1]} is a scene: leave out parts=, or name its vector file")
-    if verdicts is not None:
-        check_streamed_output(verdicts)
-    streams = open_stream(paths[0], crs=crs), open_stream(paths[1], building_id=building_id, crs=crs)
-    with _work_folder(verdicts) as work, _progress(quiet) as (say, progress):
-        comparison = evaluate_files(evaluator, streams, work, parts=parts, say=say, progress=progress)
-        if verdicts is not None:
-            say(f"writing {verdicts}")
-            write_verdict_stream(comparison, verdicts, overwrite=overwrite)
-        return comparison.evaluation
+    return evaluator
+
+
+def _streams(paths: Sequence[str], options: InParts) -> list[FootprintStream]:
+    """Open the files; the last one is the reference."""
+    from ..core.errors import InputError
+    from ..reports.streamed_layers import check_streamed_output
+    from ..scenes.geodata.footprint_stream import open_stream
+
+    if Path(paths[-1]).is_dir():
+        raise InputError(f"{paths[-1]} is a scene: leave out parts=, or name its vector file")
+    if options.verdicts is not None:
+        check_streamed_output(options.verdicts)
+    detected = [open_stream(path, crs=options.crs) for path in paths[:-1]]
+    return [*detected, open_stream(paths[-1], building_id=options.building_id, crs=options.crs)]
 
 
 @contextmanager
-def _work_folder(verdicts: Path | None) -> Iterator[Path]:
+def _running(options: InParts) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Yield the work folder, and how the work is run: parts, executor, messages and progress."""
+    with ExitStack() as stack:
+        executor = None
+        if options.scheduler is not None:
+            from ..benchmark.execution.executors import cluster_slot
+
+            executor = stack.enter_context(cluster_slot(options.scheduler)).executor
+        work = stack.enter_context(_work_folder(options.verdicts, options.scheduler))
+        say, progress = stack.enter_context(_progress(options.quiet))
+        yield work, {"parts": options.parts, "executor": executor, "say": say, "progress": progress}
+
+
+@contextmanager
+def _work_folder(verdicts: Path | None, scheduler: str | None) -> Iterator[Path]:
     """Yield the work folder, and remove it when the work is done."""
     if verdicts is None:
-        with tempfile.TemporaryDirectory(prefix="roofbench-") as folder:
+        # The workers of a cluster see the working folder rather than the temporary files of this machine.
+        place = None if scheduler is None else Path.cwd()
+        with tempfile.TemporaryDirectory(prefix="roofbench-", dir=place) as folder:
             yield Path(folder) / "work"
         return
-    work = verdicts.parent / f".{verdicts.name}.parts"
+    work = verdicts.absolute().parent / f".{verdicts.name}.parts"
     yield work
     shutil.rmtree(work, ignore_errors=True)
 

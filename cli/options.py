@@ -41,6 +41,7 @@ __all__ = [
     "MemoryLimitOption",
     "OverwriteOption",
     "ParameterOption",
+    "PartsOption",
     "PictureOption",
     "PluginOption",
     "QuietOption",
@@ -192,6 +193,16 @@ ParameterOption = Annotated[
 ]
 PictureOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE", help="Picture to write: .png, .svg or .pdf.")
+]
+PartsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--parts",
+        min=1,
+        metavar="N",
+        help="Compare files that are too large for the memory in about N parts; same result. From 2 million footprints "
+        "on, the number of parts is chosen.",
+    ),
 ]
 PluginOption = Annotated[
     list[Path] | None,

@@ -60,18 +60,26 @@ def check_folder(path: Path, overwrite: bool, *, holds: Sequence[str]) -> None:
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
+def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False, scratch: Path | None = None) -> Iterator[Path]:
     """Yield a temporary path with the same name; on success it (and its side files) replace `path`.
 
     Side files are files that a driver writes beside the requested one: ``.dbf``, ``.shx``, ``.aux.xml``.
+
+    Parameters
+    ----------
+    path : str or path
+    overwrite : bool
+    scratch : Path, optional
+        Folder of the same file system in which the temporary path is made; by default that of `path`. A process that
+        is killed leaves the temporary path behind, so work that is resumed keeps it in its work folder.
     """
     target = Path(path)
     check_target(target, overwrite)
     if target.exists() and not target.is_file():
         raise OutputError(f"{target} is {'a folder' if target.is_dir() else 'a device'}: name a file")
-    with _scratch(target) as scratch:
-        yield scratch / target.name
-        written = sorted(scratch.iterdir(), key=lambda item: item.name == target.name)
+    with _scratch(target, scratch) as folder:
+        yield folder / target.name
+        written = sorted(folder.iterdir(), key=lambda item: item.name == target.name)
         if not written:
             raise OutputError(f"{target} was not written")
         for item in written:
@@ -93,9 +101,9 @@ def whole_folder(path: str | os.PathLike[str], *, holds: Sequence[str], overwrit
 
 
 @contextmanager
-def _scratch(target: Path) -> Iterator[Path]:
+def _scratch(target: Path, place: Path | None = None) -> Iterator[Path]:
     try:
-        folder = Path(tempfile.mkdtemp(prefix=f".{target.name[:40]}.", dir=target.parent))
+        folder = Path(tempfile.mkdtemp(prefix=f".{target.name[:40]}.", dir=place or target.parent))
     except OSError as error:
         raise OutputError(f"{target} cannot be written: {error.strerror}") from error
     folder.chmod(0o755)  # mkdtemp makes it private; results are for the group too

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ from ...core.kernels import kernel
 from ...scenes.geodata.outline_batch import OutlineBatch
 from .outline_arrays import Outlines
 
-__all__ = ["Division", "OutlineStore", "StoredObjects", "part_of_points"]
+__all__ = ["Division", "OutlineStore", "StoredObjects", "StoredPart", "part_of_points"]
 
 _DONE = "done.json"
 
@@ -64,6 +64,29 @@ class StoredObjects:
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    def take(self, rows: NDArray[np.int64]) -> StoredObjects:
+        """Return the footprints of some rows."""
+        return StoredObjects(
+            self.ids[rows], self.areas[rows], self.centres[rows], self.building_codes[rows], self.quadrilateral[rows]
+        )
+
+
+class StoredPart(NamedTuple):
+    """The footprints of one part.
+
+    Attributes
+    ----------
+    rows : ndarray of int64, shape (n,)
+        In ascending order.
+    outlines : Outlines
+    quadrilateral : ndarray of bool, shape (n,)
+        As of `StoredObjects`.
+    """
+
+    rows: NDArray[np.int64]
+    outlines: Outlines
+    quadrilateral: NDArray[np.bool_]
 
 
 class OutlineStore:
@@ -151,17 +174,19 @@ class OutlineStore:
             quadrilateral=self._read("quadrilateral", np.bool_),
         )
 
-    def part(self, number: int) -> tuple[NDArray[np.int64], Outlines]:
-        """Return the rows of a part, in ascending order, and their outlines."""
+    def part(self, number: int) -> StoredPart:
+        """Return the footprints of a part, in the order of the file."""
         rows = self._read(f"{number}.rows", np.int64)
         counts = self._read(f"{number}.counts", np.int64)
         start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        return rows, Outlines.of(start, self._points(number), self.objects.areas[rows])
+        points = self._read(f"{number}.points", np.float64).reshape(-1, 2)
+        outlines = Outlines.of(start, points, self._of_rows("areas", np.float64, rows))
+        return StoredPart(rows, outlines, self._of_rows("quadrilateral", np.bool_, rows))
 
     def outlines(self, rows: NDArray[np.int64]) -> Outlines:
         """Return the outlines of some rows, in their order."""
         home, offset, count = (
-            self._read(name, kind)[rows]
+            self._of_rows(name, kind, rows)
             for name, kind in (("home", np.int32), ("offset", np.int64), ("count", np.int32))
         )
         into = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
@@ -169,11 +194,19 @@ class OutlineStore:
         order = np.argsort(home, kind="stable")
         for begin, end in _runs(home[order]):
             members = order[begin:end]
-            _fetch(self._points(int(home[members[0]])), offset[members], members, into, points)
+            every = self._mapped(f"{home[members[0]]}.points", np.float64).reshape(-1, 2)
+            _fetch(every, offset[members], members, into, points)
         return Outlines.of(into, points, self.objects.areas[rows])
 
-    def _points(self, number: int) -> NDArray[np.float64]:
-        return self._read(f"{number}.points", np.float64).reshape(-1, 2)
+    def _of_rows(self, name: str, kind: type[np.generic], rows: NDArray[np.int64]) -> NDArray[Any]:
+        """Return the values of some rows without reading the others."""
+        return np.asarray(self._mapped(name, kind)[rows])
+
+    def _mapped(self, name: str, kind: type[np.generic]) -> NDArray[Any]:
+        file = self.folder / name
+        if not file.is_file() or not file.stat().st_size:
+            return np.empty(0, dtype=kind)
+        return np.asarray(np.memmap(file, dtype=kind, mode="r"))
 
     def _append(self, name: str, values: NDArray[Any]) -> None:
         with (self.folder / name).open("ab") as stream:

@@ -7,41 +7,42 @@ numbers as in memory, and the graph of all pairs is whole, however the plane is 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.tasks import run_tasks
 from .bounds_index import meeting_bounds, meeting_bounds_within
 from .groups import Members
 from .outline_arrays import Outlines, polygons_of
 from .outline_overlaps import shared_by_outlines, shared_within
-from .outline_store import OutlineStore, part_of_points
+from .outline_store import Division, OutlineStore, StoredPart, part_of_points
 from .overlaps import NUMERICAL_ZERO, Overlaps
 from .polygon_overlay import common_ground
 from .united import united_areas
 from .vertex_distances import ring_distances
 
-__all__ = ["PairTable", "united_from_stores", "whole_graph"]
+__all__ = ["PairTable", "PartGraph", "find_pairs", "united_from_stores"]
 
 #: Most pairs of one part whose bounds meet.
 _MOST_PAIRS = 5e7
 #: Members whose outlines are in memory at a time.
 _MOST_MEMBERS = 1 << 20
-
-_BETWEEN = np.dtype([("first", "<i8"), ("second", "<i8"), ("area", "<f8"), ("outline", "<f8"), ("polis", "<f8")])
-_WITHIN = np.dtype([("first", "<i8"), ("second", "<i8"), ("area", "<f8")])
+#: Columns of the pairs of two sides, and of one.
+_BETWEEN, _WITHIN = ("first", "second", "area", "outline", "polis"), ("first", "second", "area")
 
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """Pairs (detection, reference) that share area, with their distances, sorted by (first, second).
+    """Pairs of two sides that share area, with their distances, sorted by (first, second).
 
     Attributes
     ----------
@@ -55,88 +56,156 @@ class PairTable:
     polis: NDArray[np.float64]
 
     def places(self, first: NDArray[np.int64], second: NDArray[np.int64], width: int) -> NDArray[np.int64]:
-        """Return where these pairs stand; `width` is the number of references."""
+        """Return where these pairs stand; `width` is the number of footprints of the second side."""
         keys = self.overlaps.first * width + self.overlaps.second
         places: NDArray[np.int64] = np.searchsorted(keys, first * width + second)
         return places
 
 
-def whole_graph(
-    detected: OutlineStore, reference: OutlineStore, folder: Path, progress: Callable[[int, int], None]
-) -> tuple[PairTable, tuple[Overlaps, Overlaps]]:
-    """Return the pairs between two stores and within each of them.
+class _Task(NamedTuple):
+    """One part to be measured, in a form that another process can take."""
+
+    folders: tuple[Path, ...]
+    division: Division
+    couples: tuple[tuple[int, int], ...]
+    file: Path
+    number: int
+
+
+@dataclass(frozen=True, eq=False)
+class PartGraph:
+    """The pairs of some stores, found part by part and kept in a folder.
+
+    Attributes
+    ----------
+    stores : tuple of OutlineStore
+        Complete, of one division.
+    folder : Path
+    """
+
+    stores: tuple[OutlineStore, ...]
+    folder: Path
+
+    def within(self, place: int) -> Overlaps:
+        """Return the pairs within the store at `place`."""
+        first, second, area = self._columns(f"{place}", _WITHIN, place)
+        sizes = self.stores[place].objects.areas
+        return Overlaps.of(first, second, area, (sizes, sizes))
+
+    def between(self, one: int, two: int) -> PairTable:
+        """Return the pairs of two stores with their distances."""
+        first, second, area, outline, polis = self._columns(f"{one}-{two}", _BETWEEN, two)
+        sizes = self.stores[one].objects.areas, self.stores[two].objects.areas
+        return PairTable(Overlaps.of(first, second, area, sizes), outline, polis)
+
+    def _columns(self, name: str, columns: Sequence[str], second: int) -> tuple[NDArray[Any], ...]:
+        """Return columns of all parts, sorted by (first, second)."""
+        width = len(self.stores[second].objects)
+        keys = self._joined(f"{name}.first") * width + self._joined(f"{name}.second")
+        order = np.argsort(keys)
+        del keys
+        return tuple(self._joined(f"{name}.{column}")[order] for column in columns)
+
+    def _joined(self, name: str) -> NDArray[Any]:
+        columns = []
+        for number in range(self.stores[0].division.parts):
+            with np.load(_file(self.folder, number), allow_pickle=False) as found:
+                columns.append(found[name])
+        return np.concatenate(columns)
+
+
+def find_pairs(
+    stores: Sequence[OutlineStore],
+    couples: Sequence[tuple[int, int]],
+    folder: Path,
+    *,
+    progress: Callable[[int, int], None],
+    executor: Executor | None = None,
+) -> PartGraph:
+    """Find the pairs of some couples of stores, and those within each store.
 
     What is found in a part is kept in `folder`; parts that are there already are not computed again.
 
     Parameters
     ----------
-    detected, reference : OutlineStore
+    stores : sequence of OutlineStore
         Complete, of one division.
+    couples : sequence of tuple of int
+        Places in `stores`.
     folder : Path
     progress : callable
         Takes the number of finished parts and of all.
+    executor : Executor, optional
+        Where the parts are measured; its processes must see the folders. By default the threads of this process.
 
     Raises
     ------
     InputError
         So many footprints lie on each other that their pairs would fill the memory.
     """
+    folder = folder.absolute()  # the processes of an executor may have another working folder
     folder.mkdir(exist_ok=True)
-    parts = detected.division.parts
-    for number in range(parts):
-        if not (folder / f"{number}.npz").is_file():
-            found = _pairs_of_part(detected, reference, number)
-            temporary = folder / "unfinished.npz"
-            np.savez(temporary, allow_pickle=False, **found)
-            temporary.replace(folder / f"{number}.npz")
-        progress(number + 1, parts)
-    between = _collected(folder, parts, "between")
-    sizes = detected.objects.areas, reference.objects.areas
-    table = PairTable(
-        Overlaps.of(between["first"].copy(), between["second"].copy(), between["area"].copy(), sizes),
-        between["outline"].copy(),
-        between["polis"].copy(),
-    )
-    del between
-    within = []
-    for name, areas in zip(("detected", "reference"), sizes, strict=True):
-        rows = _collected(folder, parts, name)
-        within.append(Overlaps.of(rows["first"].copy(), rows["second"].copy(), rows["area"].copy(), (areas, areas)))
-    return table, (within[0], within[1])
+    division = stores[0].division
+    tasks = [
+        _Task(tuple(store.folder for store in stores), division, tuple(couples), _file(folder, number), number)
+        for number in range(division.parts)
+    ]
+    missing = [task for task in tasks if not task.file.is_file()]
+    if len(missing) < len(tasks):
+        progress(len(tasks) - len(missing), len(tasks))
+    for done in run_tasks(_measure_part, missing, executor):
+        progress(done + len(tasks) - len(missing), len(tasks))
+    return PartGraph(tuple(stores), folder)
 
 
-def _pairs_of_part(detected: OutlineStore, reference: OutlineStore, number: int) -> dict[str, NDArray[Any]]:
-    (rows_one, one), (rows_two, two) = detected.part(number), reference.part(number)
-    first, second = _few(meeting_bounds(one.bounds, two.bounds, most=_MOST_PAIRS), detected)
-    owned = _owned(detected, one, two, first, second, number)
-    first, second = first[owned], second[owned]
-    area = shared_by_outlines(one, two, first, second)
-    shares = area > 0
-    first, second, area = first[shares], second[shares], area[shares]
-    between = np.empty(len(first), dtype=_BETWEEN)
-    between["first"], between["second"], between["area"] = rows_one[first], rows_two[second], area
-    between["outline"] = between["polis"] = np.nan
-    overlap = np.flatnonzero(area > NUMERICAL_ZERO * np.minimum(one.area[first], two.area[second]))
-    quadrilateral = (
-        detected.objects.quadrilateral[rows_one[first[overlap]]]
-        & reference.objects.quadrilateral[rows_two[second[overlap]]]
-    )
-    outline, _, polis = ring_distances(one[:2], two[:2], first[overlap], second[overlap], quadrilateral)
-    between["outline"][overlap], between["polis"][overlap] = outline, polis
-    found = {"between": between}
-    for name, store, rows, outlines in (
-        ("detected", detected, rows_one, one),
-        ("reference", reference, rows_two, two),
-    ):
+def _file(folder: Path, number: int) -> Path:
+    return folder / f"{number}.npz"
+
+
+def _measure_part(task: _Task) -> None:
+    """Find the pairs of one part and write them; the file appears whole or not at all."""
+    found = _pairs_of_part([OutlineStore(folder, task.division) for folder in task.folders], task.couples, task.number)
+    temporary = task.file.with_name(f"unfinished-{task.number}.npz")
+    np.savez(temporary, allow_pickle=False, **found)
+    temporary.replace(task.file)
+
+
+def _pairs_of_part(
+    stores: Sequence[OutlineStore], couples: Sequence[tuple[int, int]], number: int
+) -> dict[str, NDArray[Any]]:
+    parts = [store.part(number) for store in stores]
+    found: dict[str, NDArray[Any]] = {}
+    for place, (store, part) in enumerate(zip(stores, parts, strict=True)):
+        rows, outlines = part.rows, part.outlines
         first, second = _few(meeting_bounds_within(outlines.bounds, most=_MOST_PAIRS), store)
         owned = _owned(store, outlines, outlines, first, second, number)
         first, second = first[owned], second[owned]
         area = shared_within(outlines, first, second)
         shares = area > 0
-        within = np.empty(np.count_nonzero(shares), dtype=_WITHIN)
-        within["first"], within["second"], within["area"] = rows[first[shares]], rows[second[shares]], area[shares]
-        found[name] = within
+        inside = rows[first[shares]], rows[second[shares]], area[shares]
+        found |= {f"{place}.{name}": column for name, column in zip(_WITHIN, inside, strict=True)}
+    for couple in couples:
+        columns = _between(stores[couple[0]], parts[couple[0]], parts[couple[1]], number)
+        name = f"{couple[0]}-{couple[1]}"
+        found |= {f"{name}.{column}": values for column, values in zip(_BETWEEN, columns, strict=True)}
     return found
+
+
+def _between(store: OutlineStore, part: StoredPart, other: StoredPart, number: int) -> tuple[NDArray[Any], ...]:
+    """Return the columns of the pairs of one part of two sides."""
+    one, two = part.outlines, other.outlines
+    first, second = _few(meeting_bounds(one.bounds, two.bounds, most=_MOST_PAIRS), store)
+    owned = _owned(store, one, two, first, second, number)
+    first, second = first[owned], second[owned]
+    area = shared_by_outlines(one, two, first, second)
+    shares = area > 0
+    first, second, area = first[shares], second[shares], area[shares]
+    distances = np.full((2, len(first)), np.nan)
+    overlap = np.flatnonzero(area > NUMERICAL_ZERO * np.minimum(one.area[first], two.area[second]))
+    corners = part.quadrilateral[first[overlap]] & other.quadrilateral[second[overlap]]
+    outline, _, polis = ring_distances(one[:2], two[:2], first[overlap], second[overlap], corners)
+    distances[0, overlap], distances[1, overlap] = outline, polis
+    return part.rows[first], other.rows[second], area, *distances
 
 
 def _few(
@@ -162,17 +231,6 @@ def _owned(
     corner = np.maximum(one.bounds[first, :2], two.bounds[second, :2])
     owned: NDArray[np.bool_] = part_of_points(corner, store.division) == number
     return owned
-
-
-def _collected(folder: Path, parts: int, name: str) -> NDArray[Any]:
-    """Return the rows of all parts, sorted by (first, second)."""
-    rows = []
-    for number in range(parts):
-        with np.load(folder / f"{number}.npz", allow_pickle=False) as found:
-            rows.append(found[name])
-    table = np.concatenate(rows)
-    del rows
-    return table[np.lexsort((table["second"], table["first"]))]
 
 
 def united_from_stores(

@@ -6,7 +6,7 @@ of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
@@ -19,7 +19,7 @@ from ..verdict_table import LazyReasons, Measure, VerdictKind, VerdictTable
 from .correspondence import DECIMALS
 from .object_graph import OverlapGraph
 
-__all__ = ["MEASURES", "VERDICT_KINDS", "find_verdicts"]
+__all__ = ["MEASURES", "VERDICT_KINDS", "find_verdicts", "verdict_tables"]
 
 VERDICT_KINDS = (
     VerdictKind(key="TP", label="detected building", side="detection", role="correct", counts_as="correct"),
@@ -81,7 +81,13 @@ class _Neighbours:
 
 
 def find_verdicts(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> tuple[VerdictTable, VerdictTable]:
-    """Write one row per detection and one per reference.
+    """Write one row per detection and one per reference; see `verdict_tables`."""
+    detections, references = verdict_tables(graph, pair_outline)
+    return detections, references
+
+
+def verdict_tables(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> Iterator[VerdictTable]:
+    """Yield the table of the detections, then that of the references, so that one at a time may be in memory.
 
     The partner of an object without a match is the nearest one that it overlaps. ``rmse`` is given for TP only.
 
@@ -91,20 +97,27 @@ def find_verdicts(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> tup
     pair_outline : ndarray, shape (number of TP pairs,)
         Outline distance of each TP pair, by detection, m.
     """
-    pairs, match = graph.overlaps, graph.correspondence
+    pairs = graph.overlaps
     of_detection = _Neighbours(pairs.first, pairs.second, graph.distances, len(graph.detected))
     of_reference = _Neighbours(pairs.second, pairs.first, graph.distances, len(graph.reference))
     words = _Words(graph, of_detection, of_reference, _Claims.of(graph))
-    detections, references = match.pairs
+    yield _detection_table(graph, pair_outline, of_detection, words)
+    yield _reference_table(graph, pair_outline, of_reference, words)
 
+
+def _detection_table(
+    graph: OverlapGraph, pair_outline: NDArray[np.float64], neighbours: _Neighbours, words: _Words
+) -> VerdictTable:
+    match = graph.correspondence
     matched = match.of_detection >= 0
-    kind = np.where(matched, 0, np.where(of_detection.count > 0, 1, 2)).astype(np.uint8)
+    kind = np.where(matched, 0, np.where(neighbours.count > 0, 1, 2)).astype(np.uint8)
     kind[~graph.detections.mask] = 3
-    position = of_detection.nearest_pair()
-    position[detections] = graph.matched_overlaps
-    partner, measures = _measured(graph, position, graph.detected, graph.reference.ids, pairs.second)
-    measures["rmse"] = _spread(pair_outline, detections, len(graph.detected))
-    detection_table = VerdictTable(
+    position = neighbours.nearest_pair()
+    rows = match.pairs[0]
+    position[rows] = graph.matched_overlaps
+    partner, measures = _measured(graph, position, graph.detected, graph.reference.ids, graph.overlaps.second)
+    measures["rmse"] = _spread(pair_outline, rows, len(graph.detected))
+    return VerdictTable(
         ids=graph.detected.ids,
         kinds=_DETECTION_KINDS,
         kind=kind,
@@ -113,14 +126,19 @@ def find_verdicts(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> tup
         reasons=LazyReasons(len(kind), partial(words.of_detections, kind, measures)),
     )
 
-    matched = match.of_reference >= 0
-    kind = np.where(matched, 0, 1).astype(np.uint8)
+
+def _reference_table(
+    graph: OverlapGraph, pair_outline: NDArray[np.float64], neighbours: _Neighbours, words: _Words
+) -> VerdictTable:
+    match = graph.correspondence
+    kind = np.where(match.of_reference >= 0, 0, 1).astype(np.uint8)
     kind[~graph.references.mask] = 2
-    position = of_reference.nearest_pair()
-    position[references] = graph.matched_overlaps
-    partner, measures = _measured(graph, position, graph.reference, graph.detected.ids, pairs.first)
-    measures["rmse"] = _spread(pair_outline, references, len(graph.reference))
-    reference_table = VerdictTable(
+    position = neighbours.nearest_pair()
+    rows = match.pairs[1]
+    position[rows] = graph.matched_overlaps
+    partner, measures = _measured(graph, position, graph.reference, graph.detected.ids, graph.overlaps.first)
+    measures["rmse"] = _spread(pair_outline, rows, len(graph.reference))
+    return VerdictTable(
         ids=graph.reference.ids,
         kinds=_REFERENCE_KINDS,
         kind=kind,
@@ -128,7 +146,6 @@ def find_verdicts(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> tup
         measures=measures,
         reasons=LazyReasons(len(kind), partial(words.of_references, kind, measures)),
     )
-    return detection_table, reference_table
 
 
 def _spread(values: NDArray[np.float64], rows: NDArray[np.int64], count: int) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ block
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,9 +22,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ...scenes.geodata.footprints import Footprints
-from ..overlay.overlaps import overlaps_between, overlaps_within
+from ..overlay.overlaps import Overlaps, overlaps_between, overlaps_within
 
-__all__ = ["MOST_BLOCKS", "Blocks", "spatial_blocks"]
+__all__ = ["MOST_BLOCKS", "Blocks", "linked_blocks", "spatial_blocks"]
 
 #: Default maximum number of blocks: enough for percentiles, and few, so that a block holds neighbours that are alike.
 MOST_BLOCKS = 32
@@ -80,28 +80,56 @@ def spatial_blocks(sets: Sequence[Footprints], *, most: int = MOST_BLOCKS) -> Bl
     >>> blocks.groups, [labels.tolist() for labels in blocks.labels]
     (3, [[0, 1], [0, 0, 2]])
     """
-    starts = np.cumsum([0, *map(len, sets)])
-    links = [np.empty((2, 0), dtype=np.int64)]
-    for place, (own, start) in enumerate(zip(sets, starts.tolist(), strict=False)):
-        pairs = overlaps_within(own)
-        links.append(np.stack([pairs.first, pairs.second]) + start)
-        if own.building_ids is not None:
-            links.append(_same_building(own.building_codes) + start)
-        for other, further in zip(sets[place + 1 :], starts[place + 1 : -1].tolist(), strict=True):
-            pairs = overlaps_between(own, other)
-            links.append(np.stack([pairs.first + start, pairs.second + further]))
-    rows, columns = np.concatenate(links, axis=1)
+    links = {}
+    for place, own in enumerate(sets):
+        links[place, place] = _ends(overlaps_within(own))
+        for further, other in enumerate(sets[place + 1 :], place + 1):
+            links[place, further] = _ends(overlaps_between(own, other))
+    codes = [None if own.building_ids is None else own.building_codes for own in sets]
+    return linked_blocks(links, codes, [own.centres for own in sets], most=most)
+
+
+def linked_blocks(
+    links: Mapping[tuple[int, int], NDArray[np.int64]],
+    codes: Sequence[NDArray[np.int64] | None],
+    centres: Sequence[NDArray[np.float64]],
+    *,
+    most: int = MOST_BLOCKS,
+) -> Blocks:
+    """Divide sets whose overlaps are known into blocks of whole connected groups; see `spatial_blocks`.
+
+    Parameters
+    ----------
+    links : mapping of (int, int) to ndarray of int64, shape (2, n)
+        Rows of the pairs that share area, by the places of the two sets.
+    codes : sequence of ndarray of int64, shape (n,)
+        Building of each footprint of each set; None where each is its own.
+    centres : sequence of ndarray, shape (n, 2)
+        m.
+    most : int
+        Maximum number of blocks.
+    """
+    starts = np.cumsum([0, *map(len, centres)])
     total = int(starts[-1])
+    every = [np.empty((2, 0), dtype=np.int64)]
+    every += [rows + starts[list(places), None] for places, rows in links.items()]
+    every += [_same_building(own) + starts[place] for place, own in enumerate(codes) if own is not None]
+    rows, columns = np.concatenate(every, axis=1)
+    del every
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(total, total))
     groups, found = connected_components(graph, directed=False) if total else (0, np.empty(0))
     label: NDArray[np.int64] = np.asarray(found, dtype=np.int64)
-    centres = np.concatenate([np.empty((0, 2)), *(own.centres for own in sets)])
-    block = _halved(_group_centres(centres, label, groups), most)
+    middles = np.concatenate([np.empty((0, 2)), *centres])
+    block = _halved(_group_centres(middles, label, groups), most)
     return Blocks(
         labels=tuple(np.split(block[label], starts[1:-1])),
         count=int(block.max(initial=-1)) + 1,
         groups=groups,
     )
+
+
+def _ends(pairs: Overlaps) -> NDArray[np.int64]:
+    return np.stack([pairs.first, pairs.second])
 
 
 def _same_building(codes: NDArray[np.int64]) -> NDArray[np.int64]:

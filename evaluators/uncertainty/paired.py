@@ -14,7 +14,7 @@ Source of the test of fates: McNemar 1947, Psychometrika 12(2), in its exact (bi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, TypeAlias
@@ -32,11 +32,11 @@ from ..comparison import evaluate
 from ..given_footprints import GivenFootprints, GivenReference, given_sets
 from ..index import Index
 from ..registry import DEFAULT, make_evaluator
-from ..verdict_table import Side, Verdicts
-from .blocks import spatial_blocks
+from ..verdict_table import VerdictKind, VerdictTable
+from .blocks import Blocks, spatial_blocks
 from .intervals import RESAMPLES, Interval, block_tallies, interval_of, require_level, resampled_values
 
-__all__ = ["FATES", "Difference", "Fate", "PairedComparison", "compare", "mcnemar_p"]
+__all__ = ["FATES", "Difference", "Fate", "PairedComparison", "compare", "fates_of", "mcnemar_p", "paired"]
 
 Fate: TypeAlias = Literal["both", "only A", "only B", "neither", "left out"]
 #: In the order of tables and legends.
@@ -240,6 +240,21 @@ def compare(
         )
         for place, (whole, found) in enumerate(zip(evaluations, (a, b), strict=True))
     ]
+    verdicts = [evaluation.verdicts for evaluation in evaluations]
+    fates = None
+    if verdicts[0] is not None and verdicts[1] is not None:
+        fates = fates_of(verdicts[0].kinds, (verdicts[0].reference_table, verdicts[1].reference_table))
+    return paired((evaluations[0], evaluations[1]), (resampled[0], resampled[1]), fates, blocks, interval)
+
+
+def paired(
+    evaluations: tuple[Evaluation, Evaluation],
+    resampled: tuple[Mapping[str, NDArray[np.float64]], Mapping[str, NDArray[np.float64]]],
+    fates: NDArray[np.object_] | None,
+    blocks: Blocks,
+    level: float,
+) -> PairedComparison:
+    """Put the comparison together from the evaluations of A and B and the values of their indices in each resample."""
     one, two = evaluations
     return PairedComparison(
         first=one,
@@ -249,12 +264,12 @@ def compare(
                 index=index,
                 first=one.values[index.key],
                 second=two.values[index.key],
-                ends=interval_of(resampled[1][index.key] - resampled[0][index.key], blocks.count, interval),
+                ends=interval_of(resampled[1][index.key] - resampled[0][index.key], blocks.count, level),
             )
-            for index in chosen.indices
+            for index in one.evaluator.indices
         ),
-        fates=_fates(one.verdicts, two.verdicts),
-        level=interval,
+        fates=fates,
+        level=level,
         blocks=blocks.count,
         groups=blocks.groups,
         resamples=RESAMPLES,
@@ -281,19 +296,23 @@ def mcnemar_p(only_first: int, only_second: int) -> float:
     return min(1.0, 2 * float(special.bdtr(min(only_first, only_second), only_first + only_second, 0.5)))
 
 
-def _fates(first: Verdicts | None, second: Verdicts | None) -> NDArray[np.object_] | None:
-    if first is None or second is None:
-        return None
-    a, b = _found(first, "reference"), _found(second, "reference")
+def fates_of(kinds: Sequence[VerdictKind], tables: tuple[VerdictTable, VerdictTable]) -> NDArray[np.object_]:
+    """Return the fate of each reference from its verdicts in A and in B.
+
+    Parameters
+    ----------
+    kinds : sequence of VerdictKind
+        Those of the evaluator.
+    tables : tuple of VerdictTable
+        Of the references.
+    """
+    keys = {
+        effect: [kind.key for kind in kinds if kind.side == "reference" and kind.counts_as == effect]
+        for effect in ("correct", "neutral")
+    }
+    a, b = (table.where(*keys["correct"]) for table in tables)
     fates = np.full(len(a), "neither", dtype=object)
     fates[a & b], fates[a & ~b], fates[~a & b] = "both", "only A", "only B"
-    out = np.zeros(len(a), dtype=bool)
-    for kind in first.kinds_of("reference"):
-        if kind.counts_as == "neutral":
-            out |= first.mask(kind) | second.mask(kind)
-    fates[out] = "left out"
+    for table in tables:
+        fates[table.where(*keys["neutral"])] = "left out"
     return fates
-
-
-def _found(verdicts: Verdicts, side: Side) -> NDArray[np.bool_]:
-    return verdicts.table(side).where(*(kind.key for kind in verdicts.kinds_of(side) if kind.counts_as == "correct"))

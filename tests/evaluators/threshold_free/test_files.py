@@ -8,7 +8,7 @@ from builders.footprint_sets import random_detections, random_reference
 
 import roofbench as rb
 from roofbench.core.errors import CRSError, InputError
-from roofbench.evaluators.threshold_free import files
+from roofbench.evaluators.overlay import file_stores
 from roofbench.evaluators.threshold_free.evaluator import ThresholdFree
 from roofbench.evaluators.threshold_free.files import evaluate_files
 from roofbench.reports.verdict_layers import write_verdicts
@@ -68,13 +68,13 @@ def test_evaluation_and_layers_are_those_of_whole_files(tmp_path, batches_of_fiv
 def test_a_side_may_be_read_by_another_process(tmp_path, monkeypatch):
     paths = sides(tmp_path, ".fgb")
     alone = evaluate_files(ThresholdFree(), tuple(map(open_stream, paths)), tmp_path / "alone", parts=3)
-    monkeypatch.setattr(files, "_PART", 1)
+    monkeypatch.setattr(file_stores, "_PART", 1)
     both = evaluate_files(ThresholdFree(), tuple(map(open_stream, paths)), tmp_path / "both", parts=2)
     assert both.evaluation.tallies.to_dict() == alone.evaluation.tallies.to_dict()
 
 
 def test_errors_of_the_other_process_are_sentences(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "_PART", 1)
+    monkeypatch.setattr(file_stores, "_PART", 1)
     streams = tuple(map(open_stream, sides(tmp_path, ".gpkg")))
     streams[1].file.write_bytes(b"gone")
     with pytest.raises(InputError, match=r"reference\.gpkg cannot be read as a vector file"):

@@ -110,7 +110,7 @@ def test_an_outline_over_all_tiles_meets_every_house(tmp_path):
     country = shapely.box(-100, -100, 4000, 500)
     found, tables = in_parts(tmp_path, Division(7, 10.0), [*houses[:-1], country], houses, None)
     assert (found.counts.true_positives, found.counts.overlapping_detections) == (60, 60)
-    assert tables()[0].count("TP") == 60
+    assert next(tables()).count("TP") == 60
 
 
 @pytest.mark.parametrize("empty", [0, 1])
@@ -140,11 +140,13 @@ def test_an_interrupted_evaluation_goes_on(tmp_path, monkeypatch):
         evaluate_stores(ThresholdFree(), *sides, tmp_path / "pairs", progress=stop)
     from roofbench.evaluators.overlay import partition
 
+    kept = {int(file.stem) for file in (tmp_path / "pairs").glob("[0-9].npz")}
+    assert len(kept) >= 3
     measured = []
     original = partition._pairs_of_part
     monkeypatch.setattr(partition, "_pairs_of_part", lambda *args: measured.append(args[2]) or original(*args))
     found, _ = evaluate_stores(ThresholdFree(), *sides, tmp_path / "pairs")
-    assert measured == [3, 4, 5]
+    assert set(measured) == set(range(6)) - kept
     assert found.tallies.to_dict() == expected.tallies.to_dict()
 
 
