@@ -1,8 +1,8 @@
 """The evaluator ``boundary``: how far the outlines of matched footprints are apart, and how alike in shape they are.
 
 Pairs are those of the threshold-free correspondence. Per pair: PoLiS and Hausdorff distance, boundary IoU, C-IoU,
-S-IoU, largest edge angle error, orthogonality. C-IoU of the scene and both N-ratios have their own keys, because the
-literature uses one name for each two formulas.
+S-IoU, corner errors, largest edge angle error, turning function distance, orthogonality. C-IoU of the scene and both
+N-ratios have their own keys, because the literature uses one name for each two formulas.
 """
 
 from __future__ import annotations
@@ -23,19 +23,22 @@ from .base import Evaluation, Evaluator
 from .index import Curve, IndexGroup, index, ratio
 from .overlay import pair_shapes
 from .overlay.areas import mask_areas
+from .overlay.corner_matching import match_corners
 from .overlay.coverage import CountedSets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
 from .overlay.left_out import LeftOut, left_out_notes, repair_notes
 from .overlay.outline_distances import pair_distances
+from .overlay.turning import turning_distances
 from .tally import Histogram, Tallies, histogram
 from .threshold_free.correspondence import MATCHINGS
 from .threshold_free.object_graph import ObjectGraph, object_graph
 from .verdict_table import Measure, Verdicts
 
-__all__ = ["Boundary", "BoundaryIndices", "ComplexityIndices", "RegularityIndices"]
+__all__ = ["Boundary", "BoundaryIndices", "ComplexityIndices", "CornerIndices", "RegularityIndices"]
 
 _POLIS = "Avbelj, Müller & Bamler 2015"
 _ZORZI = "Zorzi, Bazrafkan, Habenschuss & Fraundorfer 2022"
+_NAUATA = "Nauata & Furukawa 2020, radius in metres"
 #: Distances in bins of 5 cm; from 5 m on in the last bin.
 _METRES = histogram(low=0.0, high=5.0, bins=100)
 
@@ -58,6 +61,16 @@ class _Sums(Tallies):
 
 
 @dataclass(frozen=True, kw_only=True)
+class _Corners(Tallies):
+    pairs: int = 0  # apart from the counts: stores of release 0.1 have pairs, but nothing of their corners
+    turning_distance: float = 0.0
+    detected: int = 0
+    reference: int = 0
+    matched: int = 0
+    distance: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Scene(Tallies):
     scenes_with_corners: int = 0
     n_ratios: float = 0.0
@@ -71,6 +84,7 @@ class _Scene(Tallies):
 class _Tallies(Tallies):
     counts: _Counts = field(default_factory=_Counts)
     sums: _Sums = field(default_factory=_Sums)
+    corners: _Corners = field(default_factory=_Corners)
     scene: _Scene = field(default_factory=_Scene)
     left_out: LeftOut = field(default_factory=LeftOut)
     polis: Histogram = field(default_factory=_METRES)
@@ -177,6 +191,42 @@ class ComplexityIndices(IndexGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
+class CornerIndices(IndexGroup):
+    """Corners of pairs, matched one to one within the corner radius; None where undefined."""
+
+    key = "corner"
+    title = "corner errors"
+
+    distance: float | None = index(
+        "corner error",
+        "lower",
+        "m",
+        lambda t: ratio(t.corners.distance, t.corners.matched),
+        symbol="CE",
+        meaning="mean distance of matched corners",
+        source=_NAUATA,
+    )
+    completeness: float | None = index(
+        "corner completeness",
+        "higher",
+        "fraction",
+        lambda t: ratio(t.corners.matched, t.corners.reference),
+        symbol="C_c",
+        meaning="matched corners / corners of the references of pairs (recall)",
+        source=_NAUATA,
+    )
+    correctness: float | None = index(
+        "corner correctness",
+        "higher",
+        "fraction",
+        lambda t: ratio(t.corners.matched, t.corners.detected),
+        symbol="K_c",
+        meaning="matched corners / corners of the detections of pairs (precision)",
+        source=_NAUATA,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class RegularityIndices(IndexGroup):
     """Directions of edges; None without a pair."""
 
@@ -191,6 +241,16 @@ class RegularityIndices(IndexGroup):
         symbol="LEAE",
         meaning="mean over pairs of the largest angle of an edge of the detection to the nearest direction of the "
         "reference",
+    )
+    turning_distance: float | None = index(
+        "turning function distance",
+        "lower",
+        "rad",
+        lambda t: ratio(t.corners.turning_distance, t.corners.pairs),
+        symbol="TFD",
+        meaning="mean over pairs of the least root mean square difference of the directions along both outlines, over "
+        "all starting points and rotations",
+        source="Arkin et al. 1991, d_2",
     )
     orthogonality: float | None = index(
         "orthogonality",
@@ -209,6 +269,7 @@ class _Pairs:
     detections: NDArray[np.int64]
     references: NDArray[np.int64]
     values: dict[str, NDArray[np.float64]]
+    corners: _Corners
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +277,7 @@ class Boundary(Evaluator):
     """Outline distances and shapes of matched footprints: PoLiS, Hausdorff, boundary IoU, C-IoU, S-IoU."""
 
     name: ClassVar[str] = "boundary"
-    groups = (BoundaryIndices, ComplexityIndices, RegularityIndices)
+    groups = (BoundaryIndices, ComplexityIndices, CornerIndices, RegularityIndices)
     tallies_type = _Tallies
     ranked_by: ClassVar[str] = "boundary.iou"
     gated_by: ClassVar[tuple[str, ...]] = ("boundary.polis", "boundary.iou", "complexity.c_iou")
@@ -232,7 +293,9 @@ class Boundary(Evaluator):
         Measure(key="boundary_iou", title="boundary IoU", unit="fraction"),
         Measure(key="c_iou", title="C-IoU", unit="fraction"),
         Measure(key="s_iou", title="S-IoU", unit="fraction"),
+        Measure(key="corner_error", title="corner error", unit="m"),
         Measure(key="edge_angle_error", title="largest edge angle error", unit="deg"),
+        Measure(key="turning_distance", title="turning function distance", unit="rad"),
         Measure(key="orthogonality", title="orthogonality", unit="fraction"),
     )
     curves = (
@@ -251,6 +314,7 @@ class Boundary(Evaluator):
     )
 
     band: float = parameter(1.0, unit="m", minimum=0.01, doc="width of the inner band of the boundary IoU")
+    corner_radius: float = parameter(1.0, unit="m", minimum=0.0, doc="largest distance of matched corners")
     matching: Literal["nearest", "one-pass", "overlap"] = parameter(
         "nearest", choices=MATCHINGS, doc="how partners are chosen", source="2010 paper, 4.1"
     )
@@ -283,6 +347,7 @@ class Boundary(Evaluator):
                 false_negatives=r_count - len(pairs.detections),
             ),
             sums=_Sums(**sums),
+            corners=pairs.corners,
             scene=_scene(graph),
             left_out=LeftOut.of(graph.detections, graph.references),
             polis=_METRES().filled(pairs.values["polis"]),
@@ -300,6 +365,10 @@ class Boundary(Evaluator):
         rows = graph.correspondence.pairs
         d, r = graph.detected.polygons[rows[0]], graph.reference.polygons[rows[1]]
         corners = pair_shapes.corner_counts(d).astype(np.float64), pair_shapes.corner_counts(r).astype(np.float64)
+        matched = match_corners(d, r, self.corner_radius)
+        turning = turning_distances(d, r)
+        with np.errstate(invalid="ignore"):
+            corner_error = matched.distances / matched.counts
         return _Pairs(
             *rows,
             {
@@ -308,9 +377,19 @@ class Boundary(Evaluator):
                 "boundary_iou": pair_shapes.boundary_iou(d, r, self.band),
                 "c_iou": graph.pair_iou * pair_shapes.complexity_factor(*corners),
                 "s_iou": graph.pair_iou * pair_shapes.simplicity_factor(corners[0]),
+                "corner_error": corner_error,
                 "edge_angle_error": pair_shapes.largest_edge_angle_error(d, r),
+                "turning_distance": turning,
                 "orthogonality": pair_shapes.orthogonal_edges(d),
             },
+            _Corners(
+                pairs=len(d),
+                turning_distance=float(turning.sum()),
+                detected=int(corners[0].sum()),
+                reference=int(corners[1].sum()),
+                matched=int(matched.counts.sum()),
+                distance=float(matched.distances.sum()),
+            ),
         )
 
     def _verdicts(self, graph: ObjectGraph, pairs: _Pairs) -> Verdicts:

@@ -18,8 +18,10 @@ from naive.systems import (
     hausdorff,
     iou,
     main_partner,
+    matched_corners,
     orthogonality,
     touched,
+    turning_distance,
 )
 
 import roofbench as rb
@@ -367,6 +369,7 @@ def test_boundary_agrees_with_plain_loops(seed):
     evaluation = evaluate("boundary", detected, reference)
     frame = evaluation.verdicts.detections
     matches, _ = correspondence(detected, reference)
+    corner_distances = []
     assert set(frame.index[frame["verdict"] == "pair"]) == set(matches)
     for d, r in matches.items():
         one, two, row = detected[d], reference[r], frame.loc[d]
@@ -379,6 +382,13 @@ def test_boundary_agrees_with_plain_loops(seed):
         assert row["s_iou"] == pytest.approx(iou(one, two) * simple, abs=1e-7)
         assert row["edge_angle_error"] == pytest.approx(edge_angle_error(one, two), abs=1e-6)
         assert row["orthogonality"] == pytest.approx(orthogonality(one), abs=1e-9)
+        assert row["turning_distance"] == pytest.approx(turning_distance(one, two), abs=1e-6)
+        near = matched_corners(one, two, 1.0)
+        assert row["corner_error"] == pytest.approx(np.mean(near), abs=1e-9) if near else np.isnan(row["corner_error"])
+        corner_distances += near
+    tallies = evaluation.tallies.corners
+    assert tallies.matched == len(corner_distances)
+    assert tallies.distance == pytest.approx(sum(corner_distances))
     scene = evaluation.tallies.scene
     masks = shapely.union_all(detected), shapely.union_all(reference)
     assert scene.mask_united == pytest.approx(masks[0].union(masks[1]).area)

@@ -1,5 +1,6 @@
 """Slow, obvious oracles of the other evaluation systems: their definitions as plain loops over shapely polygons."""
 
+import cmath
 import itertools
 import math
 
@@ -104,6 +105,46 @@ def angle(one, two):
 
 def edge_angle_error(one, two):
     return max(min(angle(a, b) for b in directions(two)) for a in directions(one))
+
+
+def turning_function(polygon):
+    """Return the places (0 to 1) of the vertices of a ring, and the direction that follows each, growing by turns."""
+    points = [complex(x, y) for x, y in shapely.orient_polygons(polygon).exterior.coords]
+    edges = [b - a for a, b in itertools.pairwise(points)]
+    places = [sum(map(abs, edges[:k])) / sum(map(abs, edges)) for k in range(len(edges))]
+    turns = [cmath.phase(b / a) for a, b in itertools.pairwise(edges)]
+    return places, list(itertools.accumulate([cmath.phase(edges[0]), *turns]))
+
+
+def turning_distance(one, two):
+    """Return the least root mean square difference of two turning functions, over all vertices as starting points."""
+    (s, a), (u, b) = turning_function(one), turning_function(two)
+
+    def at(places, directions, way):
+        round_, rest = divmod(way, 1.0)
+        return directions[max(k for k, place in enumerate(places) if place <= rest)] + 2 * math.pi * round_
+
+    squares = []
+    for shift in (x - y for x in s for y in u):
+        cuts = sorted({0.0, 1.0, *u, *((x - shift) % 1.0 for x in s)})
+        pieces = [(high - low, (low + high) / 2) for low, high in itertools.pairwise(cuts)]
+        steps = [(width, at(s, a, middle + shift) - at(u, b, middle)) for width, middle in pieces]
+        mean = sum(width * step for width, step in steps)
+        squares.append(sum(width * (step - mean) ** 2 for width, step in steps))
+    return math.sqrt(min(squares))
+
+
+def matched_corners(one, two, radius):
+    """Return the distances of the corners that are matched one to one, the nearest first."""
+    sides = [[p for ring in outline_points(polygon) for p in ring[:-1]] for polygon in (one, two)]
+    near = [(round(math.dist(p, q), 9), i, j) for i, p in enumerate(sides[0]) for j, q in enumerate(sides[1])]
+    free, found = [set(range(len(side))) for side in sides], []
+    for distance, i, j in sorted(near):
+        if distance <= radius and i in free[0] and j in free[1]:
+            free[0].remove(i)
+            free[1].remove(j)
+            found.append(distance)
+    return found
 
 
 def orthogonality(polygon):
