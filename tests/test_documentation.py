@@ -152,3 +152,15 @@ def test_the_texts_are_in_plain_english(phrase):
         if re.search(phrase, line, re.IGNORECASE)
     ]
     assert found == [], f"write: {PLAIN[phrase]}"
+
+
+def test_the_generated_pages_are_those_of_the_code():
+    """Indices, command line and Python API; older versions of typer write the help in another form."""
+    import typer
+    from documentation.reference import generated
+
+    texts = generated()
+    if tuple(map(int, typer.__version__.split(".")[:2])) < (0, 20):
+        del texts["reference/cli.md"]
+    stale = [name for name, text in texts.items() if (ROOT / "docs" / name).read_text(encoding="utf-8") != text]
+    assert stale == [], "run: python -m tests.documentation.reference"

@@ -8,9 +8,9 @@ import os
 
 import pytest
 
-from tests.documentation import commands
-from tests.documentation.commands import ROOT, Session, blocks_of, files_of, pages
-from tests.documentation.files import FILES
+from documentation import commands
+from documentation.commands import ROOT, Session, blocks_of, files_of, pages
+from documentation.files import FILES
 
 NIGHTLY = os.environ.get("ROOFBENCH_COMMANDS") == "nightly"
 WITH_COMMANDS = [page for page in pages() if blocks_of(page)]
