@@ -43,7 +43,7 @@ def as_footprints(
     and of a block its own. Parts and buildings have height, tau, slope (m, m, m/m), roof and energy, too: buildings
     those of their largest part, with the energies added up.
     """
-    blocks = outline_blocks(rectangles, prepared.grid, prepared.state, prepared.score)
+    blocks = outline_blocks(rectangles, prepared.grid, prepared.height, prepared.state, prepared.score)
     if level == "block":
         attributes: dict[str, NDArray[Any]] = {"part_of": np.arange(len(blocks))}
         return Footprints.of(blocks, crs=crs, attributes=attributes, metadata=record, source=source)

@@ -40,8 +40,9 @@ _LARGEST_STRUCTURE, _SMALLEST_BOX = 40.0, 6.0
 #: Metres: steps between neighbouring cells that the patches of boxes may hold; a low one separates houses of different
 #: height, one that is never reached keeps a block together.
 _BOX_STEPS = (0.4, 1.0, 1000.0)
-#: Share of the least height of a roof below which a point is low.
-_LOW_SHARE = 0.8
+#: Share of the least height of a roof below which a point is low: eaves and the annexes beside a roof are lower than
+#: its mean, and the ground may be some decimetres too high.
+_LOW_SHARE = 0.7
 
 
 @dataclass(frozen=True, eq=False)

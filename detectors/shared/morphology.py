@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["closed", "opened", "without_holes"]
+__all__ = ["closed", "closed_heights", "opened", "without_holes"]
 
 _Mask = NDArray[np.bool_]
 
@@ -32,6 +32,18 @@ def closed(mask: _Mask, radius: float) -> _Mask:
     solid = np.pad(mask.astype(np.uint8), reach)
     filled = cv2.morphologyEx(solid, cv2.MORPH_CLOSE, _disc(radius))
     return np.asarray(filled[reach:-reach, reach:-reach] > 0)
+
+
+def closed_heights(heights: NDArray[np.uint16], radius: float) -> NDArray[np.uint16]:
+    """Return the grey closing of heights, 0 where there are none, with a disc of a radius.
+
+    It is positive where `closed` holds, and there at most the greatest height within any disc that contains the cell.
+    """
+    import cv2
+
+    reach = int(radius) + 2
+    filled = cv2.morphologyEx(np.pad(heights, reach), cv2.MORPH_CLOSE, _disc(radius))
+    return np.asarray(filled[reach:-reach, reach:-reach])
 
 
 def opened(mask: _Mask, radius: float) -> _Mask:

@@ -1,10 +1,11 @@
 """Blocks: what is built together is one footprint, along its cells."""
 
+import cv2
 import numpy as np
 import pytest
 import shapely
 
-from roofbench.detectors.mpp import blocks
+from roofbench.detectors.mpp import block_cells, blocks
 from roofbench.detectors.mpp.blocks import outline_blocks
 from roofbench.detectors.mpp.cells import HIGH, LOW
 from roofbench.detectors.mpp.rectangles import corners, inside_any
@@ -15,15 +16,16 @@ from roofbench.scenes.geodata.raster import Grid
 GRID = Grid.covering((0.0, 0.0, 60.0, 40.0), 0.5)
 
 
-def outlined(roofs, rectangles, crowns=()):
-    """Outline blocks where boxes (x0, y0, x1, y1), metres, are roofs or crowns."""
+def outlined(roofs, rectangles, crowns=(), crown_height=500):
+    """Outline blocks where boxes (x0, y0, x1, y1), metres, are roofs, 5 m high, or crowns."""
     state, score = np.full(GRID.shape, LOW), np.full(GRID.shape, -3000, np.int16)
-    for boxes, value in ((roofs, 3000), (crowns, -2000)):
+    height = np.zeros(GRID.shape, np.uint16)
+    for boxes, value, level in ((roofs, 3000, 500), (crowns, -2000, crown_height)):
         for x0, y0, x1, y1 in boxes:
             place = np.s_[80 - round(2 * y1) : 80 - round(2 * y0), round(2 * x0) : round(2 * x1)]
-            state[place], score[place] = HIGH, value
+            state[place], score[place], height[place] = HIGH, value, level
     placed = [((x0 + x1), 80 - (y0 + y1), 2 * (x1 - x0), 2 * (y1 - y0), 0.0) for x0, y0, x1, y1 in rectangles]
-    return outline_blocks(np.array(placed, dtype=float).reshape(-1, 5), GRID, state, score)
+    return outline_blocks(np.array(placed, dtype=float).reshape(-1, 5), GRID, height, state, score)
 
 
 def likeness(one, two):
@@ -44,7 +46,8 @@ def test_cells_define_the_border_of_a_block_beyond_and_inside_its_rectangles():
 
 
 def test_cells_without_a_rectangle_make_no_block_and_crowns_beside_houses_are_no_part_of_one():
-    found = outlined([(5, 5, 15, 15), (40, 20, 50, 30)], [(5, 5, 15, 15)], crowns=[(15, 5, 25, 15)])
+    house = [(5, 5, 15, 15)]
+    found = outlined([*house, (40, 20, 50, 30)], house, crowns=[(15, 5, 25, 15)], crown_height=600)
     assert len(found) == 1
     assert likeness(found[0], shapely.box(5, 5, 15, 15)) > 0.93
 
@@ -53,6 +56,42 @@ def test_high_cells_in_a_narrow_gap_join_two_roofs_and_a_lane_separates_them():
     houses = [(5, 5, 15, 20), (18, 5, 28, 20)]
     assert len(outlined(houses, houses, crowns=[(15, 5, 18, 20)])) == 1
     assert len(outlined(houses, houses)) == 2
+
+
+def test_a_crown_that_rises_above_two_houses_does_not_join_them():
+    houses, crown = [(5, 5, 15, 20), (18, 5, 28, 20)], [(15, 5, 18, 20)]
+    assert len(outlined(houses, houses, crowns=crown, crown_height=740)) == 1
+    assert len(outlined(houses, houses, crowns=crown, crown_height=760)) == 2
+
+
+def test_a_tall_rough_place_within_one_block_is_part_of_it():
+    block = [(5, 5, 15, 20), (18, 5, 28, 20), (15, 5, 18, 10)]
+    found = outlined(block, block, crowns=[(15, 10, 18, 20)], crown_height=900)
+    assert len(found) == 1
+    assert likeness(found[0], shapely.box(5, 5, 28, 20)) > 0.97
+
+
+def test_the_rough_rim_of_a_roof_belongs_to_it_and_what_is_higher_or_lower_does_not():
+    built, high = np.zeros((20, 20), bool), np.zeros((20, 20), bool)
+    built[5:15, 3:10], high[5:15, 3:14] = True, True
+    for level, width in ((500, 2), (550, 2), (551, 0), (449, 0)):
+        height = np.where(built, 500, level).astype(np.uint16)
+        assert block_cells._with_rims(built, height, high, 2).sum() == 70 + 10 * width
+
+
+def test_rims_do_not_join_two_blocks():
+    rng = np.random.default_rng(3)
+    for seed in range(5):
+        built = smooth_noise(seed)
+        height = rng.integers(480, 520, built.shape).astype(np.uint16)
+        grown = block_cells._with_rims(built, height, np.ones_like(built), 2)
+        assert (grown & built).sum() == built.sum() < grown.sum()
+        labels = cv2.connectedComponents(built.astype(np.uint8), connectivity=4)[1]
+        owners = cv2.connectedComponents(grown.astype(np.uint8), connectivity=4)[1]
+        # Each grown part holds one block, as far as blocks did not touch by corners before.
+        for part in range(1, owners.max() + 1):
+            inside = np.unique(labels[(owners == part) & built])
+            assert len(inside) <= 1
 
 
 def test_a_courtyard_is_a_hole():
