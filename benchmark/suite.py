@@ -6,7 +6,7 @@ suite
     Named scenes, detectors and evaluators; every detector runs on every scene.
 scene entry
     A folder (``path``), a real scene that comes with roofbench (``name``), or a preset of the generator with ``seeds``
-    and parameters, of which a list is a sweep axis.
+    and parameters, of which a list is a sweep axis. A folder with ``tile`` is a city: detectors see it tile by tile.
 detector entry
     A detector with parameters and the seeds of its random streams.
 """
@@ -30,6 +30,7 @@ from ..detectors.external.external_paths import with_absolute_paths
 from ..detectors.registry import DETECTORS, make_detector
 from ..evaluators.base import Evaluator
 from ..evaluators.registry import make_evaluator
+from ..scenes.remote import is_address
 from ..scenes.scene import Scene
 from ..scenes.shipped import shipped_names
 from .identity.recipes import SceneRecipe, label_of, preset_names
@@ -147,7 +148,9 @@ def scenes_of(words: Iterable[str]) -> tuple[SceneRecipe, ...]:
     recipes: dict[str, SceneRecipe] = {}
     for word in words:
         path = Path(word)
-        if path.is_dir() and (word not in shipped_names() or (path / "scene.toml").is_file()):
+        if is_address(word):
+            recipe = SceneRecipe.of_folder(word)
+        elif path.is_dir() and (word not in shipped_names() or (path / "scene.toml").is_file()):
             recipe = SceneRecipe.of_folder(path)
         elif word in shipped_names():
             recipe = SceneRecipe.of_shipped(word)
@@ -314,11 +317,18 @@ def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number
     (source,) = sources
     if source != "preset":
         for key in entry:
-            if key != source:
+            if key != source and (source, key) != ("path", "tile"):
                 raise places.error(f"{key!r} is not allowed for a scene with a {source}", "scenes", number, key)
+        tile = entry.get("tile", 0.0)
+        if "tile" in entry and not (isinstance(tile, int | float) and 16 <= tile <= 100_000):
+            raise places.error(f"tile must be from 16 to 100000 metres, not {tile!r}", "scenes", number, "tile")
         try:
             value = str(entry[source])
-            yield SceneRecipe.of_folder(folder / value) if source == "path" else SceneRecipe.of_shipped(value)
+            if source == "path":
+                place = value if is_address(value) else folder / value
+                yield SceneRecipe.of_folder(place, tile=float(tile))
+            else:
+                yield SceneRecipe.of_shipped(value)
         except RoofbenchError as error:
             raise places.error(str(error), "scenes", number, source) from error
         return

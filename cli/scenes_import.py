@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .options import GsdOption, JoinGapsOption, OverwriteOption, QuietOption
 from .progress import import_progress
+from .scenes_index import report_index
+
+if TYPE_CHECKING:
+    from ..scenes.importing.request import ImportRequest
 
 __all__ = ["import_"]
 
@@ -114,6 +118,10 @@ def import_(
     licence: Annotated[
         str | None, typer.Option("--licence", metavar="TEXT", help="Licence of the data, for the manifest.")
     ] = None,
+    tiled: Annotated[
+        bool,
+        typer.Option("--tiled", help="Keep the files as they are and read them by window: for scenes of any size."),
+    ] = False,
     overwrite: OverwriteOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -149,6 +157,19 @@ def import_(
         source=source,
         licence=licence,
     )
+    if tiled:
+        _import_tiles(output, request, overwrite, quiet)
+        return
     with import_progress() as (note, progress):
         scene = import_scene(output, request, overwrite=overwrite, note=None if quiet else note, progress=progress)
     typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.contents)}")
+
+
+def _import_tiles(output: Path, request: ImportRequest, overwrite: bool, quiet: bool) -> None:
+    from ..scenes.importing.tiled_import import import_tiles
+
+    with import_progress() as (note, progress):
+        found = import_tiles(
+            output, request, overwrite=overwrite, note=None if quiet else note, progress=None if quiet else progress
+        )
+    report_index(output, found)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .options import QuietOption
 from .progress import import_progress
 
-__all__ = ["index"]
+if TYPE_CHECKING:
+    from ..scenes.importing.tile_index import IndexedFolder
+
+__all__ = ["index", "report_index"]
 
 
 def index(
@@ -35,6 +38,11 @@ def index(
 
     with import_progress() as (_, progress):
         found = index_folder(folder, crs=crs, name=name, progress=None if quiet else progress)
+    report_index(folder, found)
+
+
+def report_index(folder: Path, found: IndexedFolder) -> None:
+    """Print what a folder of tiles holds and which files are left out of it; exit code 3 when there are any."""
     for problem in found.problems:
         typer.echo(f"Error: {problem}", err=True)
     typer.echo(f"{folder}: scene {found.scene.name!r} with {', '.join(found.scene.contents)}")

@@ -26,7 +26,7 @@ __all__ = ["detect_tiles"]
 def detect_tiles(
     recipe: SceneRecipe, detector: Detector, output: Path, city: City, options: RunOptions, *, overwrite: bool
 ) -> None:
-    """Detect tile by tile, and report; exit code 3 when a tile failed."""
+    """Detect tile by tile, and report; exit code 3 when a tile failed or a file is left out of the scene."""
     from ..benchmark.execution.city import detect_city
 
     with _progress(options) as report:
@@ -41,6 +41,8 @@ def detect_tiles(
         )
     if not options.quiet:
         _say(result, output, recipe.name)
+    for problem in result.left_out:
+        typer.echo(f"left out: {problem}", err=True)
     if result.failed:
         for tile, reason in result.failed.items():
             typer.echo(f"failed: tile {tile.label}: {reason}", err=True)
@@ -49,6 +51,13 @@ def detect_tiles(
             "give the same command with --overwrite, which computes these tiles alone",
             err=True,
         )
+    if result.left_out:
+        typer.echo(
+            f"{len(result.left_out)} files are no part of the scene: repair them, index it again, and repeat the "
+            "command with --overwrite, which computes the tiles that they change",
+            err=True,
+        )
+    if result.failed or result.left_out:
         raise typer.Exit(3)
 
 

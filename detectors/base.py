@@ -79,6 +79,14 @@ class Detector(Parameterised, ABC):
         """
         return {}
 
+    def survey(self, scene: Scene) -> Mapping[str, Any]:
+        """Return numbers (nested lists of whole numbers) that `detect` would count on all of a scene, in its `core`.
+
+        Those of several parts of a city add up; `detect` finds the sums in `Scene.whole` and uses them instead of what
+        it would count on a tile.
+        """
+        return {}
+
     def fingerprint(self) -> str:
         """Return a digest of what it reads besides the scene (a program, footprints made elsewhere); empty for none.
 

@@ -22,10 +22,11 @@ order of the tiles and of the number of workers.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import statistics
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -48,8 +49,8 @@ CUT = "cut_by_tile"
 _SAME, _COVERED = 0.5, 0.5
 #: Metres from the rim of the halo within which a footprint counts as cut.
 _RIM = 1.0
-#: Places at which a scene is measured, and their width, metres.
-_SAMPLES, _SAMPLE_WIDTH = 5, 200.0
+#: Number of places at which a scene is measured and surveyed, their width and their halo, metres.
+_SAMPLES, _SURVEYED, _SAMPLE_WIDTH, _SAMPLE_HALO = 5, 16, 240.0, 30.0
 
 _Extent = tuple[float, float, float, float]
 
@@ -73,11 +74,17 @@ class Tile:
         """``x 84992 y 447488``: the south-west corner."""
         return f"x {self.core[0]:.0f} y {self.core[1]:.0f}"
 
+    def ends(self, whole: _Extent) -> tuple[bool, bool, bool, bool]:
+        """Return on which sides, west, south, east and north, a scene of an extent ends with the tile."""
+        west, south, east, north = self.core
+        return west <= whole[0], south <= whole[1], east >= whole[2], north >= whole[3]
+
     def owns(self, centres: NDArray[np.float64], whole: _Extent) -> NDArray[np.bool_]:
         """Return which centres, shape (n, 2), belong to the tile in a scene of an extent."""
-        west, south, east, north = self.core
-        west, south = -math.inf if west <= whole[0] else west, -math.inf if south <= whole[1] else south
-        east, north = math.inf if east >= whole[2] else east, math.inf if north >= whole[3] else north
+        beyond = (-math.inf, -math.inf, math.inf, math.inf)
+        west, south, east, north = (
+            far if ends else edge for ends, edge, far in zip(self.ends(whole), self.core, beyond, strict=True)
+        )
         x, y = centres[:, 0], centres[:, 1]
         return np.asarray((x >= west) & (x < east) & (y >= south) & (y < north))
 
@@ -89,10 +96,21 @@ class Tile:
 
 
 class Measured(NamedTuple):
-    """What all tiles of a scene share: measured parameters of the detector, and the cell of the ground filter (m)."""
+    """What all tiles of a scene share.
+
+    Attributes
+    ----------
+    parameters : dict of str to float
+        Parameters that the detector measures (`Detector.measured`).
+    ground_cell : float, optional
+        Cell size of the ground filter, metres.
+    whole : dict
+        Sums of what the detector counts (`Detector.survey`).
+    """
 
     parameters: dict[str, float]
     ground_cell: float | None
+    whole: dict[str, Any]
 
 
 class Seams(NamedTuple):
@@ -131,25 +149,38 @@ def stream_of(seed: int, tile: Tile, detector: Detector) -> np.random.Generator:
 
 
 def measure(scene: Scene, detector: Detector, tiles: Sequence[Tile]) -> Measured:
-    """Return what a detector would measure (`Detector.measured`): the lower median over up to five tiles.
+    """Return what all tiles share.
 
+    What a detector measures is the lower median over up to five tiles, and what it counts the sum over up to sixteen.
     Only the middle of each tile is read. Tiles without points and tiles that cannot be read are skipped; the latter are
     reported when they are processed.
     """
     found: dict[str, list[float]] = defaultdict(list)
     cells: list[float] = []
-    for tile in _spread(tiles):
-        part = _middle(scene, tile)
-        if part is None or part.points is None or len(part.points) == 0:
-            continue
+    for part in itertools.islice(_samples(scene, tiles), _SAMPLES):
+        assert part.points is not None
         cells.append(default_cell(part.points.x, part.points.y, part.extent))
         part.ground_cell = cells[-1]
         for name, value in detector.measured(part).items():
             found[name].append(float(value))
-        if len(cells) == _SAMPLES:
-            break
     parameters = {name: statistics.median_low(values) for name, values in sorted(found.items())}
-    return Measured(parameters, statistics.median_low(cells) if cells else None)
+    ground_cell = statistics.median_low(cells) if cells else None
+    whole: dict[str, Any] = {}
+    fixed = detector.replaced(parameters)
+    if type(fixed).survey is not Detector.survey:
+        for part in itertools.islice(_samples(scene, tiles), _SURVEYED):
+            part.ground_cell = ground_cell
+            for name, counts in fixed.survey(part).items():
+                whole[name] = np.add(whole.get(name, 0), counts).tolist()
+    return Measured(parameters, ground_cell, whole)
+
+
+def _samples(scene: Scene, tiles: Sequence[Tile]) -> Iterator[Scene]:
+    """Yield the middles of tiles that lie far apart, those with points."""
+    for tile in _spread(tiles):
+        part = _middle(scene, tile)
+        if part is not None and part.points is not None and len(part.points):
+            yield part
 
 
 def _spread(tiles: Sequence[Tile]) -> list[Tile]:
@@ -164,7 +195,7 @@ def _middle(scene: Scene, tile: Tile) -> Scene | None:
     high_x, high_y = min(east, scene.extent[2]), min(north, scene.extent[3])
     x, y, reach = (low_x + high_x) / 2, (low_y + high_y) / 2, min(_SAMPLE_WIDTH, tile.side) / 2
     try:
-        part = scene.window((x - reach, y - reach, x + reach, y + reach)).for_detection()
+        part = scene.window((x - reach, y - reach, x + reach, y + reach), _SAMPLE_HALO).for_detection()
         _ = part.points, part.image, part.dem
     except RoofbenchError:
         return None

@@ -33,6 +33,7 @@ from ..core.plain_values import plain_value
 from ..core.registry import nearest_hint
 from .geodata.crs import require_metric
 from .geodata.footprints import Footprints
+from .remote import copy_of, fetch_into_copy, is_address
 from .scene import Scene
 from .shipped import shipped_names, shipped_or_given
 from .tile_layers import checksum, tile_problem, tiled_layers
@@ -46,7 +47,9 @@ __all__ = [
     "read_manifest",
     "save_scene",
     "update_checksums",
+    "write_area",
     "write_manifest",
+    "write_reference",
 ]
 
 MANIFEST = "scene.toml"
@@ -71,6 +74,8 @@ SCENE_FILES = (
     "*.lax",
     "LICENCE.txt",
 )
+#: Facts at the head of the manifest; of tiles, `left_out` says which files are no part of the scene and why.
+_HEAD = ("source", "licence", "notes", "derived", "left_out")
 #: Version of the layout; raised when older folders can no longer be read.
 _FORMAT = 1
 
@@ -81,7 +86,8 @@ def open_scene(path: str | os.PathLike[str]) -> Scene:
     Parameters
     ----------
     path : path
-        The folder, its ``scene.toml``, or the name of a scene that comes with roofbench (see `scenes.shipped`).
+        The folder, its ``scene.toml``, the name of a scene that comes with roofbench (see `scenes.shipped`), or an
+        address such as ``https://host/town`` (see `scenes.remote`).
 
     Raises
     ------
@@ -94,7 +100,7 @@ def open_scene(path: str | os.PathLike[str]) -> Scene:
     for kind in files:
         sources[kind] = _LayerFile(kind, folder / FILES[kind], files[kind])
     sources.update(tiled_layers(folder, manifest.get("tiles", ()), manifest.get("crs", "")))
-    facts: dict[str, Any] = {key: manifest[key] for key in ("source", "licence", "notes", "derived") if key in manifest}
+    facts: dict[str, Any] = {key: manifest[key] for key in _HEAD if key in manifest}
     facts.update(manifest.get("facts", {}))
     return Scene(
         manifest["name"],
@@ -132,15 +138,15 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, overwrite: bool = 
 
             write_elevation(scene.dem, folder / FILES["dem"], crs=scene.crs)
         if scene.reference is not None:
-            _write_reference(scene.reference, folder / FILES["reference"], scene.crs)
+            write_reference(scene.reference, folder / FILES["reference"], scene.crs)
         if scene.area is not None:
-            _write_area(scene.area, folder / FILES["area"], scene.crs)
+            write_area(scene.area, folder / FILES["area"], scene.crs)
         write_manifest(folder, _manifest(scene, folder))
 
 
 def read_manifest(path: str | os.PathLike[str]) -> tuple[Path, dict[str, Any]]:
     """Return the folder and the checked content of its ``scene.toml``."""
-    given = shipped_or_given(path)
+    given = copy_of(os.fspath(path)) if is_address(os.fspath(path)) else shipped_or_given(path)
     folder = given.parent if given.name == MANIFEST else given
     file = folder / MANIFEST
     if not folder.exists():
@@ -165,6 +171,7 @@ def read_manifest(path: str | os.PathLike[str]) -> tuple[Path, dict[str, Any]]:
         sentence = str(error)
         raise CRSError(sentence if sentence.startswith(str(file)) else f"{file}: {sentence}") from error
     for kind in manifest.get("files", {}):
+        fetch_into_copy(folder, FILES[kind])
         if not (folder / FILES[kind]).is_file():
             raise InputError(
                 f"{folder / FILES[kind]}: no such file, though {MANIFEST} lists it; put it back or make the scene again"
@@ -200,7 +207,7 @@ def _manifest(scene: Scene, folder: Path) -> dict[str, Any]:
         manifest["crs"] = scene.crs
     manifest["units"] = "metre"
     manifest["extent"] = list(scene.extent)
-    for key in ("source", "licence", "notes", "derived"):
+    for key in _HEAD:
         if facts.get(key):
             manifest[key] = facts.pop(key)
         else:
@@ -307,7 +314,8 @@ class _LayerFile:
         return found if self.kind == "reference" else shapely.union_all(found.polygons)
 
 
-def _write_reference(reference: Footprints, file: Path, crs: str | None) -> None:
+def write_reference(reference: Footprints, file: Path, crs: str | None) -> None:
+    """Write reference footprints as they lie in a scene folder."""
     from .geodata.vector_files import write_layers
 
     columns: dict[str, Any] = dict(reference.attributes)
@@ -318,7 +326,8 @@ def _write_reference(reference: Footprints, file: Path, crs: str | None) -> None
     write_layers({"reference": (reference.polygons, columns)}, file, crs=crs)
 
 
-def _write_area(area: shapely.Geometry, file: Path, crs: str | None) -> None:
+def write_area(area: shapely.Geometry, file: Path, crs: str | None) -> None:
+    """Write an evaluation area as it lies in a scene folder."""
     from .geodata.vector_files import write_layers
 
     write_layers({"area": (np.array([area], dtype=object), {"id": np.array([0])})}, file, crs=crs)

@@ -113,6 +113,10 @@ class Scene(Displayed):
         self._is_for_detection = False
         #: Cell size of the ground filter, metres, which windows take over; None: from the density of the points.
         self.ground_cell: float | None = None
+        #: Part of the extent whose buildings are wanted: of a window its extent without the halo.
+        self.core = self.extent
+        #: What a detector counted on the whole scene (`Detector.survey`), which windows take over; empty: count here.
+        self.whole: Mapping[str, Any] = {}
 
     @property
     def contents(self) -> tuple[str, ...]:
@@ -248,7 +252,8 @@ class Scene(Displayed):
             content_hash=partial(self._part_hash, wanted),
             **layers,
         )
-        part.ground_cell = self.ground_cell
+        part.ground_cell, part.whole = self.ground_cell, self.whole
+        part.core = max(xmin, own[0]), max(ymin, own[1]), min(xmax, own[2]), min(ymax, own[3])
         return part
 
     def _part(self, name: str, extent: tuple[float, float, float, float]) -> Any:
@@ -290,7 +295,7 @@ class Scene(Displayed):
             image=self.image,
             dem=self.dem,
         )
-        seen.ground_cell = self.ground_cell
+        seen.ground_cell, seen.core, seen.whole = self.ground_cell, self.core, self.whole
         seen._is_for_detection = True
         return seen
 

@@ -20,10 +20,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.errors import InputError
+from .geodata.point_chunks import read_chunk_index
 from .geodata.points import PointCloud
 from .geodata.raster import Grid
+from .remote import fetch_into_copy
 
 __all__ = ["TILED_LAYERS", "TileFile", "TiledLayer", "checksum", "tile_problem", "tiled_layers"]
 
@@ -84,7 +87,7 @@ class TiledLayer:
         met = self._met(extent)
         paths = [self._sound(file) for file in met]
         if self.layer == "points":
-            return _points(paths, extent)
+            return _points(paths, extent, self._chunks(met))
         if not met:
             return None
         from .geodata.raster_files import read_raster_header
@@ -115,12 +118,16 @@ class TiledLayer:
         east, north = bounds[:, 2:].max(axis=0).tolist()
         return Grid(west, north, gsd, round((north - south) / gsd), round((east - west) / gsd))
 
+    def _chunks(self, files: Sequence[TileFile]) -> dict[Path, NDArray[np.float64]]:
+        known = read_chunk_index(self.folder)
+        return {self.folder / file.file: known[file.sha256] for file in files if file.sha256 in known}
+
     def _sound(self, file: TileFile) -> Path:
         path = self.folder / file.file
+        fetch_into_copy(self.folder, file.file)
         if not path.is_file():
             raise InputError(f"{path}: no such file, though the scene lists it; put it back, or index the scene again")
-        state = path.stat()
-        if _checksum(path, state.st_size, state.st_mtime_ns) != file.sha256:
+        if checksum(path) != file.sha256:
             raise InputError(
                 f"{path} changed since the scene was indexed: if that is intended, run 'roofbench scenes index "
                 f"{self.folder}'"
@@ -162,9 +169,15 @@ def tile_problem(entries: Any) -> str | None:
 
 
 def checksum(path: Path) -> str:
-    """Return the SHA-256 of a file; files that did not change are not read twice."""
+    """Return the SHA-256 of a file, of a VRT with the files that it shows; files that did not change are read once."""
     state = path.stat()
-    return _checksum(path, state.st_size, state.st_mtime_ns)
+    own = _checksum(path, state.st_size, state.st_mtime_ns)
+    if path.suffix.lower() != ".vrt":
+        return own
+    from .geodata.raster_mosaic import raster_sources
+
+    shown = [checksum(source) for source in sorted(raster_sources(path)) if source.is_file()]
+    return hashlib.sha256(" ".join([own, *shown]).encode()).hexdigest()
 
 
 @lru_cache(maxsize=4096)
@@ -173,14 +186,14 @@ def _checksum(path: Path, size: int, changed: int) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _points(paths: Sequence[Path], extent: _Extent) -> PointCloud:
+def _points(paths: Sequence[Path], extent: _Extent, chunks: Mapping[Path, NDArray[np.float64]]) -> PointCloud:
     if not paths:
         none = np.empty(0)
         return PointCloud(x=none, y=none, z=none)
     from .geodata.las_files import read_points
     from .usable_points import is_land, is_noise
 
-    cloud = read_points(paths, window=extent)
+    cloud = read_points(paths, window=extent, chunks=chunks)
     usable = is_land(cloud.z) & ~is_noise(cloud)
     if not usable.all():
         cloud = cloud.take(usable)

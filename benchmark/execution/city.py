@@ -80,6 +80,8 @@ class CityResult(NamedTuple):
     seams : Seams
     failed, skipped : dict of Tile to str
         Tiles without a result, with the reason: they failed, or lack an input.
+    left_out : tuple of str
+        Files that are no part of the scene, with the reason.
     measured : Measured
     peak_memory : int
         Highest resident memory of a worker, bytes; 0 where it is not known.
@@ -91,6 +93,7 @@ class CityResult(NamedTuple):
     seams: Seams
     failed: dict[Tile, str]
     skipped: dict[Tile, str]
+    left_out: tuple[str, ...]
     measured: Measured
     peak_memory: int
 
@@ -141,14 +144,15 @@ def detect_city(
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder} cannot be made: {error.strerror}") from error
-    base = digest([_code_of(detector), detector.name, detector.values(), recipe.name, scene.extent, city.tile, halo])
+    base = digest([_code_of(detector), detector.name, detector.values(), recipe.name, city.tile, halo])
     measured = _measured(folder / _MEASURED, base, scene, detector, tiles)
     fixed = detector.replaced(measured.parameters)
     jobs = []
     for tile in tiles if order is None else order(tiles):
         window = scene.window(tile.core, halo).content_hash
-        key = digest([base, measured, city.seed if fixed.stochastic else 0, window, tile.core])
-        part = TilePart(tile=tile, halo=halo, ground_cell=measured.ground_cell)
+        seed = city.seed if fixed.stochastic else 0
+        key = digest([base, measured, seed, window, tile.core, tile.ends(scene.extent)])
+        part = TilePart(tile=tile, halo=halo, measured=measured)
         task = Task(scene=recipe, detector=PluginRecipe.of(fixed), seed=city.seed, evaluators=(), part=part)
         jobs.append(_Job(tile, task, folder / f"{tile.column}_{tile.row}.{key[:32]}"))
     waiting = [job for job in jobs if not job.file.exists()]
@@ -157,7 +161,8 @@ def detect_city(
     parts = {tile: _footprints(outcome) for tile, outcome in outcomes.items() if outcome.status == "ok"}
     found, seams = join_tiles(parts, crs=scene.crs, numbers=detector.numbers, source=detector.name)
     write_footprints(found, output, overwrite=overwrite)
-    if not failed:
+    left_out = tuple(scene.facts.get("left_out", ()))
+    if not failed and not left_out:
         _remove(folder)
     return CityResult(
         footprints=len(found),
@@ -166,6 +171,7 @@ def detect_city(
         seams=seams,
         failed=dict(sorted(failed.items())),
         skipped={tile: str(done.reason) for tile, done in sorted(outcomes.items()) if done.status == "skipped"},
+        left_out=left_out,
         measured=measured,
         peak_memory=max((outcome.cost.peak_memory or 0 for outcome in outcomes.values()), default=0),
     )
@@ -181,7 +187,7 @@ def _measured(file: Path, base: str, scene: Scene, detector: Detector, tiles: Se
         with suppress(ValueError, KeyError, TypeError):
             stored = json.loads(file.read_text("utf-8"))
             if stored["key"] == base:
-                return Measured(stored["parameters"], stored["ground_cell"])
+                return Measured(stored["parameters"], stored["ground_cell"], stored["whole"])
     found = measure(scene, detector, tiles)
     with whole_file(file, overwrite=True) as scratch:
         scratch.write_text(json.dumps({"key": base, **found._asdict()}), encoding="utf-8")

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from typing import Self
+from typing import Any, Self
 
-from ...detectors.tiling import Tile
+from ...detectors.tiling import Measured, Tile
 from ..identity.recipes import PluginRecipe, SceneRecipe
 
 __all__ = ["Task", "TilePart"]
@@ -25,13 +25,13 @@ class TilePart:
     tile : Tile
     halo : float
         Metres around it that the detector sees, too.
-    ground_cell : float, optional
-        Cell size of the ground filter, metres.
+    measured : Measured
+        What all tiles share.
     """
 
     tile: Tile
     halo: float
-    ground_cell: float | None
+    measured: Measured
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,7 @@ class Task:
                 "evaluators": [recipe.to_dict(execution=True) for recipe in self.evaluators],
                 "codes": list(self.codes),
                 "describe_scene": self.describe_scene,
-                "part": None if self.part is None else asdict(self.part),
+                "part": None if self.part is None else {**asdict(self.part), "measured": self.part.measured._asdict()},
             }
         )
 
@@ -86,5 +86,9 @@ class Task:
             evaluators=tuple(PluginRecipe(**recipe) for recipe in values["evaluators"]),
             codes=tuple(values["codes"]),
             describe_scene=values["describe_scene"],
-            part=None if part is None else TilePart(**{**part, "tile": Tile(**part["tile"])}),
+            part=None if part is None else _part(**part),
         )
+
+
+def _part(tile: dict[str, Any], halo: float, measured: dict[str, Any]) -> TilePart:
+    return TilePart(tile=Tile(**tile), halo=halo, measured=Measured(**measured))

@@ -24,7 +24,7 @@ from ...detectors.base import Detector
 from ...detectors.checks import checked_output
 from ...detectors.external.precomputed import Precomputed
 from ...detectors.streams import random_stream
-from ...detectors.tiling import owned, stream_of
+from ...detectors.tiling import Tile, join_tiles, measure, owned, stream_of, tiles_over
 from ...evaluators.base import Evaluator
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
@@ -95,24 +95,26 @@ def execute(
         detector = detector if detector is not None else task.detector.detector()
         if evaluators is None:
             evaluators = [recipe.evaluator() for recipe in task.evaluators]
-        record = describe(scene) if task.describe_scene else None
+        is_city = task.part is None and task.scene.tile > 0
+        record = describe(scene, is_city=is_city) if task.describe_scene else None
         whole = scene
         if task.part is not None:
             scene = _window(scene, task.part)
-        lacking = scene.lacks(detector.requires)
-        if lacking:
-            return Outcome(status="skipped", reason=lacking, scene=record, machine=machine_facts())
-        scene.for_detection()  # reads all inputs: the time of a detector is that of detection in memory
-        if task.part is None:
-            reset_highest_memory()  # that of a tile includes its reading
+        if not is_city:
+            scene.require(detector.requires)
+            scene.for_detection()  # reads all inputs: the time of a detector is that of detection in memory
+            if task.part is None:
+                reset_highest_memory()  # that of a tile includes its reading
         started = _now()
-        if task.part is None:
+        if is_city:
+            found = _detect_city(scene, detector, task.seed, task.scene.tile)
+        elif task.part is None:
             found = detect(scene, detector, seed=task.seed)
         else:
             found = _detect_part(scene, detector, task.seed, task.part, whole.extent)
         cost = _cost_since(started)
         codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
-    except MissingInputError as error:  # a program that this machine lacks
+    except MissingInputError as error:  # the scene lacks an input, or this machine a program
         return Outcome(status="skipped", reason=reason_of(error), scene=record, machine=machine_facts())
     except Exception as error:
         return Outcome(
@@ -135,8 +137,9 @@ def execute(
         return outcome
     if detected is not None:
         detected(outcome)
+    grid = None if is_city else scene.evaluation_grid
     results = [
-        score(found, scene.reference, recipe, code, evaluator, area=scene.area, grid=scene.evaluation_grid)
+        score(found, scene.reference, recipe, code, evaluator, area=scene.area, grid=grid)
         for recipe, code, evaluator in zip(task.evaluators, codes, evaluators, strict=True)
     ]
     return dataclasses.replace(
@@ -148,8 +151,27 @@ def execute(
 
 def _window(scene: Scene, part: TilePart) -> Scene:
     window = scene.window(part.tile.core, part.halo)
-    window.ground_cell = part.ground_cell
+    window.ground_cell, window.whole = part.measured.ground_cell, part.measured.whole
     return window
+
+
+def _detect_city(scene: Scene, detector: Detector, seed: int, side: float) -> Footprints:
+    """Return what a detector finds on a scene tile by tile, one tile in memory at a time."""
+    tiles = tiles_over(scene.extent, side)
+    measured = measure(scene, detector, tiles)
+    fixed = detector.replaced(measured.parameters)
+    parts: dict[Tile, Footprints] = {}
+    lacking = ""
+    for tile in tiles:
+        part = TilePart(tile=tile, halo=detector.halo, measured=measured)
+        window = _window(scene, part)
+        reason = window.lacks(fixed.requires)
+        if reason is None:
+            parts[tile] = _detect_part(window, fixed, seed, part, scene.extent)
+        lacking = lacking or reason or ""
+    if not parts:
+        raise MissingInputError(lacking)
+    return join_tiles(parts, crs=scene.crs, numbers=detector.numbers, source=detector.name)[0]
 
 
 def _detect_part(
@@ -188,9 +210,10 @@ def reason_of(error: Exception) -> str:
     return " ".join(reason.split())[:500]
 
 
-def describe(scene: Scene) -> SceneRecord:
-    """Return the record of a scene."""
-    reference, grid, picture = scene.reference, scene.evaluation_grid, scene_picture(scene)
+def describe(scene: Scene, *, is_city: bool = False) -> SceneRecord:
+    """Return the record of a scene; of a city neither points nor images are read for it."""
+    reference = scene.reference
+    grid, picture = (None, None) if is_city else (scene.evaluation_grid, scene_picture(scene))
     labels = None if reference is None or reference.building_ids is None else reference.building_ids
     return SceneRecord(
         content_hash=scene.content_hash,
@@ -202,7 +225,7 @@ def describe(scene: Scene) -> SceneRecord:
         reference_ids=() if reference is None else tuple(reference.ids.tolist()),
         building_ids=None if labels is None else tuple(plain_value(label) for label in labels),
         facts={name: value for name, value in scene.facts.items() if _is_json(value)},
-        point_count=None if scene.points is None else len(scene.points),
+        point_count=None if is_city or scene.points is None else len(scene.points),
         picture=None if picture is None else picture.content,
     )
 
@@ -216,7 +239,7 @@ def _is_json(value: Any) -> bool:
 
 
 def _opened(recipe: SceneRecipe) -> Scene:
-    key = repr(recipe)
+    key = repr((recipe, recipe.written))
     if key not in _scenes:
         while len(_scenes) >= _KEPT_SCENES:
             _scenes.popitem(last=False)

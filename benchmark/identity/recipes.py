@@ -25,7 +25,8 @@ from ...detectors.registry import DETECTORS, make_detector
 from ...evaluators.base import Evaluator
 from ...evaluators.registry import EVALUATORS, make_evaluator
 from ...scenes.builtin import hamlet
-from ...scenes.folder import open_scene
+from ...scenes.folder import MANIFEST, open_scene
+from ...scenes.remote import copy_of, is_address
 from ...scenes.scene import Scene
 from ...scenes.shipped import shipped_folder, shipped_names
 from ...scenes.synthetic import make_scene
@@ -122,13 +123,15 @@ class SceneRecipe:
     name : str
         Name in tables: ``knox-small-3[tree_density=40]``; ``fairfield@1`` where a preset is called ``fairfield-1``.
     place : str
-        Folder, name of a shipped scene, preset or file.
+        Folder or its address, name of a shipped scene, preset or file.
     seed : int
         Of a preset and of the built-in scene.
     parameters : mapping
         Parameters of the generator that differ from the preset; the axes of a sweep.
     content_hash : str
         Of a scene in memory or spooled, else empty.
+    tile : float
+        Of a folder: side of the tiles in which detectors see it, metres; 0 where they see it whole.
     """
 
     kind: Literal["folder", "shipped", "preset", "builtin", "spooled", "memory"]
@@ -137,12 +140,15 @@ class SceneRecipe:
     seed: int = 0
     parameters: Mapping[str, Any] = field(default_factory=dict)
     content_hash: str = ""
+    tile: float = 0.0
 
     @classmethod
-    def of_folder(cls, folder: str | Path) -> Self:
+    def of_folder(cls, folder: str | Path, *, tile: float = 0.0) -> Self:
         """Return the recipe of a scene folder; its manifest is read for the name."""
+        if is_address(str(folder)):
+            return cls("folder", _open_folder(str(folder)).name, str(folder), tile=tile)
         path = Path(folder).resolve()
-        return cls("folder", _open_folder(str(path)).name, str(path))
+        return cls("folder", _open_folder(str(path)).name, str(path), tile=tile)
 
     @classmethod
     def of_shipped(cls, name: str) -> Self:
@@ -238,7 +244,13 @@ class SceneRecipe:
             # Random streams follow from the name of the scene itself, in which there is no @.
             name = f"{self.place}-{self.seed}{self.name[len(f'{self.place}-{self.seed}') :]}"
             return digest([name, module_closure(_GENERATOR).digest, values, self.seed])
-        return digest([self.name, self.content_hash or _open_folder(self._folder or self.place).content_hash])
+        content = self.content_hash or _open_folder(self._folder or self.place).content_hash
+        return digest([self.name, content, *([self.tile] if self.tile else [])])
+
+    @property
+    def written(self) -> int:
+        """When the manifest of its folder was written: an opened scene is not used beyond that; 0 without a folder."""
+        return 0 if self._folder is None else _written(self._folder)
 
     def open(self) -> Scene:
         """Return the scene."""
@@ -263,6 +275,7 @@ class SceneRecipe:
             "seed": self.seed,
             "parameters": dict(self.parameters),
             "content_hash": self.content_hash,
+            **({"tile": self.tile} if self.tile else {}),
         }
 
     @classmethod
@@ -271,8 +284,19 @@ class SceneRecipe:
         return cls(**cast("dict[str, Any]", dict(values)))
 
 
-@lru_cache(maxsize=8)
 def _open_folder(folder: str) -> Scene:
+    """Return the scene of a folder, which is opened again after its manifest was written anew."""
+    return _opened(folder, _written(folder))
+
+
+def _written(folder: str) -> int:
+    """Return when the manifest of a folder was written."""
+    manifest = (copy_of(folder) if is_address(folder) else Path(folder)) / MANIFEST
+    return manifest.stat().st_mtime_ns if manifest.is_file() else 0
+
+
+@lru_cache(maxsize=8)
+def _opened(folder: str, changed: int) -> Scene:
     return open_scene(folder)
 
 

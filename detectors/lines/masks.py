@@ -54,6 +54,8 @@ _BAND = 512
 _HEIGHT_BIN = 2.0
 #: Side of the cells of masks that do not follow the image, metres.
 _MASK_CELL = 0.25
+#: Share of a cell by which rounding may move a place.
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +78,17 @@ class Masks:
     neighbourhood: int
 
 
-def _count(points: PointCloud, grid: Grid, cell: float) -> NDArray[np.int64]:
-    coarse = Grid(
-        grid.west, grid.north, cell, math.ceil(grid.rows * grid.gsd / cell), math.ceil(grid.columns * grid.gsd / cell)
+def _places(grid: Grid, coarse: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the row of another grid below the centre of each row of a grid, and the column of each column."""
+    x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)
+    _, y = grid.to_world(np.arange(grid.rows) + 0.5, 0)
+    row, _ = coarse.to_pixel(coarse.west, y)
+    _, column = coarse.to_pixel(x, coarse.north)
+    # Centres on the border of two cells belong to the second, whatever the rounding.
+    return (
+        np.clip(np.floor(row + _ROUNDING), 0, coarse.rows - 1).astype(np.intp),
+        np.clip(np.floor(column + _ROUNDING), 0, coarse.columns - 1).astype(np.intp),
     )
-    return point_counts(points.x, points.y, coarse)
 
 
 def pulse_spacing(points: PointCloud, grid: Grid) -> float:
@@ -92,19 +100,20 @@ def pulse_spacing(points: PointCloud, grid: Grid) -> float:
     if points.return_number is not None and (points.return_number == 1).any():
         points = points.take(points.return_number == 1)
     cell = 2 * _COVERAGE_CELL
-    return spacing_of_counts(_count(points, grid, cell), cell, "median") or cell
+    counts = point_counts(points.x, points.y, Grid.covering(grid.extent, cell))
+    return spacing_of_counts(counts, cell, "median") or cell
 
 
 def _coverage(points: PointCloud, grid: Grid) -> NDArray[np.uint8]:
-    occupied = (_count(points, grid, _COVERAGE_CELL) > 0).astype(np.uint8)
+    # All coarse cells are those of a raster in absolute coordinates: a window of a scene has the same ones.
+    coarse = Grid.covering(grid.extent, _COVERAGE_CELL)
+    occupied = (point_counts(points.x, points.y, coarse) > 0).astype(np.uint8)
     width = 2 * round(_WIDEST_VOID / _COVERAGE_CELL / 2) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
     margin = width // 2
     padded = cv2.copyMakeBorder(occupied, margin, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[margin:-margin, margin:-margin]
-    rows = np.minimum((np.arange(grid.rows) + 0.5) * grid.gsd / _COVERAGE_CELL, closed.shape[0] - 1).astype(np.intp)
-    columns = np.minimum((np.arange(grid.columns) + 0.5) * grid.gsd / _COVERAGE_CELL, closed.shape[1] - 1)
-    covered: NDArray[np.uint8] = closed[np.ix_(rows, columns.astype(np.intp))]
+    covered: NDArray[np.uint8] = closed[np.ix_(*_places(grid, coarse))]
     return covered
 
 
@@ -268,13 +277,11 @@ def build_cell_masks(
     clip : bool
         Whether the primary mask is white outside the coverage.
     """
-    scale = grid.gsd / _MASK_CELL
-    cells = Grid(grid.west, grid.north, _MASK_CELL, math.ceil(grid.rows * scale), math.ceil(grid.columns * scale))
+    cells = Grid.covering(grid.extent, _MASK_CELL)
     side = 2 * round(max(0.5, 0.5 * math.floor(2 * spacing + 0.5)) / _MASK_CELL - 1) + 1
-    rows = ((np.arange(grid.rows) + 0.5) * scale).astype(np.intp)
-    columns = ((np.arange(grid.columns) + 0.5) * scale).astype(np.intp)
+    places = np.ix_(*_places(grid, cells))
     white, secondary = (
-        _squares(_hits(points, chosen, cells), side)[np.ix_(rows, columns)]
+        _squares(_hits(points, chosen, cells), side)[places]
         for chosen in (points.z < thresholds, points.z > thresholds)
     )
     coverage = _coverage(points, grid)

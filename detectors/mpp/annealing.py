@@ -16,7 +16,7 @@ from .local_search import local_search
 from .sampler import ChainSchedule, run_chain
 from .windows import Window, window_energy
 
-__all__ = ["Annealed", "Boxes", "Schedule", "anneal", "search"]
+__all__ = ["Annealed", "Boxes", "Schedule", "anneal", "room_of", "search"]
 
 #: Buildings that a window may hold besides its boxes and its present buildings.
 _ROOM = 64
@@ -59,7 +59,7 @@ class Schedule:
     data_share : float
         Share of births from boxes.
     greedy : bool
-        Whether the chain starts from boxes.
+        Whether the chain starts from boxes, and the start is the result where the chain does not improve it.
     sweeps : int
         Maximum number of local-search sweeps.
     """
@@ -90,6 +90,11 @@ class Annealed:
     final: float
 
 
+def room_of(boxes: Boxes, own: Rectangles) -> int:
+    """Return how many buildings a window may hold."""
+    return _ROOM + 2 * len(own) + min(len(boxes), _MOST_BOXES)
+
+
 def search(window: Window, start: Rectangles, boxes: Boxes, *, capacity: int, sweeps: int) -> Rectangles:
     """Return what a local search makes of a state."""
     best: Rectangles
@@ -97,7 +102,7 @@ def search(window: Window, start: Rectangles, boxes: Boxes, *, capacity: int, sw
     return best
 
 
-def anneal(window: Window, boxes: Boxes, own: Rectangles, schedule: Schedule, state: RandomState) -> Annealed:
+def anneal(window: Window, boxes: Boxes, first: Rectangles, schedule: Schedule, state: RandomState) -> Annealed:
     """Process one window.
 
     Parameters
@@ -105,22 +110,17 @@ def anneal(window: Window, boxes: Boxes, own: Rectangles, schedule: Schedule, st
     window : Window
     boxes : Boxes
         Centred in the window.
-    own : ndarray, shape (k, 5)
-        Buildings to start from.
+    first : ndarray, shape (k, 5)
+        Buildings to start from: what `search` made of the boxes, or none.
     schedule : Schedule
     state : ndarray of uint64
         Random stream.
     """
-    capacity = _ROOM + 2 * len(own) + min(len(boxes), _MOST_BOXES)
-
-    def searched(rectangles: Rectangles) -> Rectangles:
-        return search(window, rectangles, boxes, capacity=capacity, sweeps=schedule.sweeps)
-
-    first = searched(own) if schedule.greedy else own
+    capacity = room_of(boxes, first)
     births = make_births(window, boxes.rectangles, boxes.weights, schedule.data_share)
     chain, _, trace, chain_energy = run_chain(window, births, first, schedule.chain, capacity, state)
     start = float(window_energy(window, first))
-    ends = [searched(chain)]
+    ends = [search(window, chain, boxes, capacity=capacity, sweeps=schedule.sweeps)]
     if chain_energy >= start - 1e-9 and schedule.greedy:
         ends.append(first)
     finals = [float(window_energy(window, end)) for end in ends]

@@ -15,6 +15,7 @@ crowns are Gaussian as in Yu, Li, Guan & Wang (2013), equation 1.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ from .cells import Cells
 from .textures import LOG_HIGH, LOG_LOW, OPENNESS_BINS, ROUGHNESS_BINS, Bins, textures
 from .threads import ONE_THREAD, Threads
 
-__all__ = ["Background", "estimate_background"]
+__all__ = ["Background", "estimate_background", "tally_textures"]
 
 #: Priors of roofs and crowns: median roughness (m) in windows of cells of `_COMMON` metres,
 #: spread of its logarithm, openness. A wider window holds more ridges and steps: roofs grow as the cell, crowns as its
@@ -96,15 +97,29 @@ def _log_likelihoods(logs: Floats, means: list[float], spreads: list[float], ope
     ]
 
 
-def estimate_background(cells: Cells, *, threads: Threads = ONE_THREAD) -> tuple[Background, Bins]:
-    """Estimate the classes of a scene; also return the bin of the texture of each cell."""
+def tally_textures(
+    cells: Cells, extent: Sequence[float] | None = None, *, threads: Threads = ONE_THREAD
+) -> tuple[Integers, Bins]:
+    """Return n, sum of heights and of their squares (cm) of each bin, shape (192, 3), and the bin of each cell.
+
+    With an extent only the cells in it count.
+    """
     bins = textures(cells.height, cells.state, cells.openness, threads=threads)
-    tally = np.sum(threads.bands(lambda first, last: _tally(bins, cells.height, first, last), len(bins)), axis=0)
+    part = None if extent is None else cells.grid.part(extent)
+    counted = (
+        (bins, cells.height) if part is None else tuple(map(np.ascontiguousarray, (bins[part], cells.height[part])))
+    )
+    tally = np.sum(threads.bands(lambda first, last: _tally(*counted, first, last), len(counted[0])), axis=0)
+    return tally, bins
+
+
+def estimate_background(tally: Integers, cell: float) -> Background:
+    """Estimate the classes of a scene from what `tally_textures` counted in it, in cells of so many metres."""
     counts = tally[:, 0].astype(np.float64).reshape(ROUGHNESS_BINS, OPENNESS_BINS)
     logs = LOG_LOW + (np.arange(ROUGHNESS_BINS) + 0.5) * (LOG_HIGH - LOG_LOW) / ROUGHNESS_BINS
     size_of_sample = int(counts.sum())
     pseudo = max(_PSEUDO_CELLS, _PSEUDO_SHARE * size_of_sample)
-    wider = cells.grid.gsd / _COMMON
+    wider = cell / _COMMON
     before = (
         (wider * _ROOF_ROUGHNESS[0], _ROOF_ROUGHNESS[1]),
         (math.sqrt(wider) * _CROWN_ROUGHNESS[0], _CROWN_ROUGHNESS[1]),
@@ -137,7 +152,7 @@ def estimate_background(cells: Cells, *, threads: Threads = ONE_THREAD) -> tuple
     crown_height = (rise + _HEIGHT_CELLS * _CROWN_HEIGHT) / (size + _HEIGHT_CELLS)
     scatter = squares - 2.0 * crown_height * rise + crown_height**2 * size
     crown_spread = math.sqrt((max(scatter, 0.0) + _HEIGHT_CELLS * _CROWN_SPREAD**2) / (size + _HEIGHT_CELLS))
-    background = Background(
+    return Background(
         crown_height=float(crown_height),
         crown_spread=max(crown_spread, _LEAST_SPREAD),
         crown_share=share,
@@ -146,4 +161,3 @@ def estimate_background(cells: Cells, *, threads: Threads = ONE_THREAD) -> tuple
         evidence=tuple(tuple(float(value) for value in row) for row in evidence),
         cells=size_of_sample,
     )
-    return background, bins

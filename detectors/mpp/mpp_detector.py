@@ -22,16 +22,17 @@ from ..base import Detector
 from ..steps import Step
 from .arrays import Mask, Rectangles
 from .cells import cell_size, has_points
-from .city import join_traces, sample_city, total_energy
 from .energy import rectangle_energies
 from .memory import release_memory
 from .mpp_steps import mpp_steps
 from .outcome import as_footprints, fit_roofs
 from .parameters import MPPParameters
-from .preparation import Prepared, prepare, weights_of
+from .preparation import Prepared, prepare, survey_textures, weights_of
 from .scores import mean_evidence
+from .squares import side_of
 from .tables import NO_TABLES
 from .threads import started_threads
+from .whole_scene import join_traces, sample_scene, total_energy
 
 __all__ = ["MPP"]
 
@@ -41,6 +42,7 @@ _REMOVED = {
     "false_alarm_ratio": "it belongs to the detector 'mpp-printed'",
     "iterations": "it belongs to the detector 'mpp-printed'; the proposals of 'mpp' follow from effort",
     "workers": "set the execution option threads",
+    "tile": "the squares in which it works follow from largest_side",
     "outline": "choose the level part, building or block",
     **dict.fromkeys(
         ("furniture", "hot", "cold", "intensity", "jump_share", "split_share", "data_births"),
@@ -80,8 +82,8 @@ class MPP(MPPParameters, Detector):
 
     @property
     def halo(self) -> float:  # type: ignore[override]
-        """Twice the longest diagonal of a rectangle, metres."""
-        return 2 * math.sqrt(2) * self.largest_side
+        """The side of a square (`squares`) and half the longest diagonal of a rectangle, metres."""
+        return side_of(self.largest_side) + math.sqrt(0.5) * self.largest_side
 
     def measured(self, scene: Scene) -> Mapping[str, float]:
         """Return the cell size, unless it is given."""
@@ -89,6 +91,10 @@ class MPP(MPPParameters, Detector):
         if self.cell is not None or points is None or not len(points):
             return {}
         return {"cell": cell_size(points.x, points.y, scene.extent)}
+
+    def survey(self, scene: Scene) -> Mapping[str, Any]:
+        """Return the textures from which the classes of roofs and crowns are estimated."""
+        return survey_textures(self, scene)
 
     def _evident(self, prepared: Prepared, rectangles: Rectangles) -> Mask:
         """Return which rectangles look like a roof on the whole, not only in sum.
@@ -115,7 +121,7 @@ class MPP(MPPParameters, Detector):
         with started_threads(self.threads) as threads:
             prepared = prepare(self, points, seen, threads)
             ready = time.perf_counter()
-            rectangles, results = sample_city(self, prepared, seed, threads)
+            rectangles, results = sample_scene(self, prepared, seed, seen.core, threads)
         rectangles = rectangles[self._evident(prepared, rectangles)]
         done = time.perf_counter()
         energies = rectangle_energies(prepared.tables, rectangles, prepared.model)

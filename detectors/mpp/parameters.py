@@ -163,9 +163,6 @@ class MPPParameters(Parameterised):
         doc="maximum number of local-search sweeps; 0 disables the search and with it the greedy start",
         source=_OWN,
     )
-    tile: float = parameter(
-        256.0, unit="m", minimum=16, doc="side of a tile; at least twice largest_side is used", source=_OWN
-    )
     threads: int = execution_option(1, minimum=1, doc="number of threads")
 
     def __post_init__(self) -> None:

@@ -19,8 +19,8 @@ from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..shared.cue_information import CueInformation
 from .annealing import Boxes
-from .arrays import Heights, Mask, Rectangles, Scores, States
-from .background import Background, estimate_background
+from .arrays import Heights, Integers, Mask, Rectangles, Scores, States
+from .background import Background, estimate_background, tally_textures
 from .candidates import propose_boxes
 from .cells import cell_size, make_cells
 from .energy import Model, rectangle_energies
@@ -33,7 +33,7 @@ from .tables import LONGEST, TALLEST, Tables, make_tables
 from .textures import textures
 from .threads import Threads
 
-__all__ = ["Prepared", "prepare", "weights_of"]
+__all__ = ["Prepared", "prepare", "survey_textures", "weights_of"]
 
 #: Square metres: largest rough place that counts as a structure of the roof around it, smallest box that is proposed.
 _LARGEST_STRUCTURE, _SMALLEST_BOX = 40.0, 6.0
@@ -43,6 +43,8 @@ _BOX_STEPS = (0.4, 1.0, 1000.0)
 #: Share of the least height of a roof below which a point is low: eaves and the annexes beside a roof are lower than
 #: its mean, and the ground may be some decimetres too high.
 _LOW_SHARE = 0.7
+#: Names of the textures of a whole scene, counted with and without the number of returns.
+_MULTIPLE_TALLY, _SINGLE_TALLY = "textures", "textures_of_single_returns"
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +139,14 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
     low = _LOW_SHARE * parameters.least_height
     grid, ground = Grid.covering(scene.extent, cell), scene.heights.ground
     cells = make_cells(points, ground, grid, low=low, threads=threads)
-    background, bins = estimate_background(cells, threads=threads)
-    cues = cues_of(points, bins)
+    counted, bins = tally_textures(cells, threads=threads)
+    tally = _of_whole(scene, _MULTIPLE_TALLY, counted)
+    cues = cues_of(points, tally[:, 0])
     if MULTIPLE in cues.silent:
         cells = make_cells(replace(points, number_of_returns=None), ground, grid, low=low, threads=threads)
-        background, bins = estimate_background(cells, threads=threads)
+        counted, bins = tally_textures(cells, threads=threads)
+        tally = _of_whole(scene, _SINGLE_TALLY, counted)
+    background = estimate_background(tally, cell)
     weights = weights_of(parameters)
     fitted = fitted_cells(cells, bins, background, weights, threads=threads)
     if parameters.carried_share <= 1:
@@ -159,6 +164,24 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
         fitted = fitted_cells(cells, bins, background, weights, threads=threads)
     score = score_cells(cells, bins, background, weights, threads=threads)
     return _Classes(background, cells.height, cells.state, score, fitted, cues)
+
+
+def _of_whole(scene: Scene, name: str, counted: Integers) -> Integers:
+    """Return what was counted on the whole scene of which this is a window, else what was counted here."""
+    return np.array(scene.whole[name], dtype=np.int64) if name in scene.whole else counted
+
+
+def survey_textures(parameters: MPPParameters, scene: Scene) -> dict[str, list[list[int]]]:
+    """Return the textures in the core of a scene, counted with and without the number of returns."""
+    points = scene.points
+    assert points is not None
+    cell = parameters.cell or cell_size(points.x, points.y, scene.extent)
+    grid, ground = Grid.covering(scene.extent, cell), scene.heights.ground
+    found = {}
+    for name, cloud in ((_MULTIPLE_TALLY, points), (_SINGLE_TALLY, replace(points, number_of_returns=None))):
+        cells = make_cells(cloud, ground, grid, low=_LOW_SHARE * parameters.least_height)
+        found[name] = tally_textures(cells, scene.core)[0].tolist()
+    return found
 
 
 def weights_of(parameters: MPPParameters) -> Weights:

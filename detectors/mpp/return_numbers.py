@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ...scenes.geodata.points import PointCloud
 from ..shared.cue_information import ANCHOR, CueInformation
-from .textures import LOG_HIGH, LOG_LOW, OPENNESS_BINS, ROUGHNESS_BINS, Bins
+from .arrays import Integers
+from .textures import LOG_HIGH, LOG_LOW, OPENNESS_BINS, ROUGHNESS_BINS
 
 __all__ = ["MULTIPLE", "cues_of"]
 
@@ -24,20 +23,19 @@ _SMOOTH, _FEWEST = 0.15, 100
 _MOST_OPEN = 0.5
 
 
-def cues_of(points: PointCloud, bins: Bins) -> CueInformation:
+def cues_of(points: PointCloud, counts: Integers) -> CueInformation:
     """Return which cues the textures of a scene are made of.
 
     Parameters
     ----------
     points : PointCloud
-    bins : ndarray of int16, shape (rows, columns)
-        As `textures` returns them.
+    counts : ndarray of int64, shape (192,)
+        Number of cells of each bin (`textures`), of the whole scene.
     """
     used = (ANCHOR, "penetration")
     returns = points.number_of_returns
     if returns is None or not (returns > 1).any():
         return CueInformation(used, {})
-    counts = np.bincount(bins[bins >= 0], minlength=ROUGHNESS_BINS * OPENNESS_BINS)
     counts = counts.reshape(ROUGHNESS_BINS, OPENNESS_BINS)
     last = math.ceil((math.log(_SMOOTH) - LOG_LOW) / (LOG_HIGH - LOG_LOW) * ROUGHNESS_BINS)
     smooth, opened = counts[:last].sum(), counts[:last, OPENNESS_BINS // 2 :].sum()

@@ -7,7 +7,7 @@ chunk
     and one chunk, never a second copy of the file.
 window
     ``(xmin, ymin, xmax, ymax)`` in metres; points on its border belong to it. A COPC file is read only where its
-    octree meets the window.
+    octree meets the window, other files only in the chunks that do, where their bounds are known (`point_chunks`).
 
 Columns that a file carries but never fills (all return numbers, intensities, classes or colours 0) are None.
 Points flagged *withheld* are left out: the standard (ASPRS LAS 1.4 R15, table 16) says they must not be processed.
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import datetime
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,9 +30,10 @@ from ...core.errors import InputError, OutputError
 from ...core.inputs import require_file
 from .crs import parse_crs
 from .las_headers import HEADER_BYTES, header_crs, refuse_cut_off, refuse_pointwise, refuse_record_counts
+from .point_chunks import chunks_of_file, fits, met_points
 from .points import PointCloud
 
-__all__ = ["LasHeader", "read_las_header", "read_points", "write_points"]
+__all__ = ["LasHeader", "read_chunks", "read_las_header", "read_points", "write_points"]
 
 #: Name under which point files are written.
 _SOFTWARE = "roofbench"
@@ -135,6 +136,7 @@ def read_points(
     paths: Sequence[str | os.PathLike[str]] | str | os.PathLike[str],
     *,
     window: tuple[float, float, float, float] | None = None,
+    chunks: Mapping[Path, NDArray[np.float64]] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> PointCloud:
     """Read the points of one or several files, in the order of the files.
@@ -145,6 +147,8 @@ def read_points(
         All in one CRS; that is for the caller to check (`read_las_header`).
     window : tuple of float, optional
         ``(xmin, ymin, xmax, ymax)``, metres; everything when not given.
+    chunks : mapping of Path to ndarray, optional
+        Bounds of the chunks of files (`point_chunks`): a window reads only those that it meets.
     progress : callable, optional
         Called with (points unpacked so far, points in all).
 
@@ -160,7 +164,7 @@ def read_points(
     seen = 0
     for header in headers:
         missed = window is not None and not _meet(window, header.bounds)
-        for chunk in () if missed else _chunks(header, window):
+        for chunk in () if missed else _chunks(header, window, (chunks or {}).get(header.path)):
             columns.add(chunk, window, header.bounds)
             seen += len(chunk)
             if progress is not None:
@@ -325,12 +329,23 @@ def _opened(file: Path) -> Iterator[Any]:
         ) from error
 
 
-def _chunks(header: LasHeader, window: tuple[float, float, float, float] | None) -> Iterator[Any]:
-    """Yield the points of a file by chunk; of a COPC file only those of the octree nodes in the window."""
+def read_chunks(path: Path) -> NDArray[np.float64] | None:
+    """Return the bounds of the chunks of a point file, shape (n, 4), metres; None where they differ in size."""
+    with _opened(path) as reader:
+        return chunks_of_file(reader)
+
+
+def _chunks(
+    header: LasHeader, window: tuple[float, float, float, float] | None, bounds: NDArray[np.float64] | None
+) -> Iterator[Any]:
+    """Yield the points of a file by chunk; of a window only the chunks, or nodes of a COPC file, that it meets."""
     if header.is_copc and window is not None and not _covers(window, header.bounds):
         yield _copc_points(header, window)
         return
     with _opened(header.path) as reader:
+        if window is not None and bounds is not None and fits(reader.header, bounds):
+            yield from met_points(reader, bounds, window, CHUNK)
+            return
         found = 0
         for chunk in reader.chunk_iterator(CHUNK):
             found += len(chunk)

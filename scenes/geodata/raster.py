@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -119,10 +119,20 @@ class Grid:
         return (flat, inside) if x.ndim else self._cells(x, y)
 
     def _cells(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        row, column = self.to_pixel(x, y)
+        row, column = self._whole_pixels(x, y)
         inside = (row >= 0) & (row < self.rows) & (column >= 0) & (column < self.columns)
-        flat = np.where(inside, np.floor(row) * self.columns + np.floor(column), 0)
+        flat = np.where(inside, row * self.columns + column, 0)
         return flat.astype(np.intp), inside
+
+    def _whole_pixels(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Any, Any]:
+        """Return row and column of points as whole numbers.
+
+        They are counted from the origin of the CRS, and only the shift of the cells against it, to a micrometre, is
+        that of the grid: a point on the border of two cells is in the same one on the grid of every window.
+        """
+        first, last = math.floor(self.west / self.gsd + 1e-6), math.ceil(self.north / self.gsd - 1e-6)
+        east, south = round(self.west - first * self.gsd, 6), round(last * self.gsd - self.north, 6)
+        return last - np.ceil((y + south) / self.gsd), np.floor((x - east) / self.gsd) - first
 
 
 @dataclass(frozen=True, eq=False)

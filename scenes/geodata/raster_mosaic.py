@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from .crs import crs_label, same_crs
 from .raster import Elevation, Grid, Image
 from .raster_files import RasterHeader, alpha_of, band_names, data_mask, opened, require_image_type
 
-__all__ = ["mosaic_elevation", "mosaic_image", "resampling_note", "warped_extent", "warped_size"]
+__all__ = ["mosaic_elevation", "mosaic_image", "raster_sources", "resampling_note", "warped_extent", "warped_size"]
 
 #: Largest mean difference of two images of one place that are copies of each other, as a share of the largest value.
 _SAME_IMAGE = 0.05
@@ -56,6 +57,15 @@ class _Overlap:
     @property
     def is_another_image(self) -> bool:
         return self.is_whole and self.difference > _SAME_IMAGE * self.shared
+
+
+def raster_sources(path: Path) -> tuple[Path, ...]:
+    """Return the files that a virtual raster (VRT) shows; none where it cannot be read."""
+    try:
+        with opened(path) as source:
+            return tuple(Path(name).resolve() for name in source.files if Path(name).resolve() != path.resolve())
+    except InputError:
+        return ()
 
 
 def mosaic_image(

@@ -1,33 +1,41 @@
 """Index of tiles: a folder of point files, images and elevation models becomes a scene, and no file is copied.
 
-Of each file the header is read and the checksum is computed; bounds and checksum go into the manifest. Rasters of 8 or
-16 bit without sign are images, all others elevation models. ``reference.gpkg`` and ``area.gpkg`` in the folder belong
-to the scene.
+Of each file the header is read and the checksum is computed; bounds and checksum go into the manifest, and the bounds
+of the chunks of large point files beside it (`geodata.point_chunks`). Rasters of 8 or 16 bit without sign are images,
+all others elevation models; those that a VRT shows are read through it. ``reference.gpkg`` and ``area.gpkg`` in the
+folder belong to the scene.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError, RoofbenchError
 from ..folder import FILES, MANIFEST, open_scene, read_manifest, write_manifest
 from ..geodata.crs import crs_label, named_crs, require_metric, same_crs
-from ..geodata.las_files import read_las_header
+from ..geodata.las_files import read_chunks, read_las_header
+from ..geodata.point_chunks import read_chunk_index, write_chunk_index
 from ..geodata.raster import Grid
 from ..geodata.raster_files import RasterHeader, band_names, read_raster_header
+from ..geodata.raster_mosaic import raster_sources
 from ..scene import Scene
 from ..tile_layers import checksum
 
-__all__ = ["IndexedFolder", "index_folder"]
+__all__ = ["IMAGE_TYPES", "IndexedFolder", "index_folder"]
 
-_POINTS, _RASTERS = (".las", ".laz"), (".tif", ".tiff", ".jp2")
+_POINTS, _RASTERS = (".las", ".laz"), (".tif", ".tiff", ".jp2", ".vrt")
+#: Types of the cells of images.
+IMAGE_TYPES = ("uint8", "uint16")
 #: Largest shift between the cells of two rasters that still coincide, cells.
 _SAME_CELLS = 1e-3
+#: Number of points from which the chunks of a file are indexed.
+_LARGE = 200_000
 
 
 class IndexedFolder(NamedTuple):
@@ -80,9 +88,12 @@ def index_folder(
     if not files:
         raise InputError(f"{home} holds no tiles: expected point files ({', '.join(_POINTS)}) or rasters below it")
     tiles, problems = [], []
+    chunks: dict[str, NDArray[np.float64]] = {}
+    known = read_chunk_index(home)
     for number, file in enumerate(files, start=1):
         try:
             tiles.append(_tile(home, file, crs))
+            _add_chunks(file, tiles[-1].entry, known, chunks)
         except (RoofbenchError, OSError) as error:
             problems.append(f"{file.relative_to(home)} is left out: {error}")
         if progress is not None:
@@ -106,9 +117,8 @@ def index_folder(
         **{key: before[key] for key in ("source", "licence", "derived", "facts") if key in before},
         **(facts or {}),
     }
-    notes = [*(facts or {}).get("notes", ()), *problems]
-    if notes:
-        manifest["notes"] = notes
+    if problems:
+        manifest["left_out"] = problems
     listed = {
         kind: {"file": FILES[kind], "sha256": checksum(home / FILES[kind])}
         for kind in ("reference", "area")
@@ -117,6 +127,7 @@ def index_folder(
     if listed:
         manifest["files"] = listed
     manifest["tiles"] = [tile.entry for tile in sound]
+    write_chunk_index(home, chunks)
     write_manifest(home, manifest)
     return IndexedFolder(open_scene(home), tuple(problems))
 
@@ -124,7 +135,10 @@ def index_folder(
 def _files(home: Path, manifest: dict[str, Any]) -> list[Path]:
     if manifest.get("files") and not manifest.get("tiles") and {"points", "image", "dem"} & set(manifest["files"]):
         raise InputError(f"{home} is a scene of single files already: name a folder of tiles")
-    found = (path for path in home.rglob("*") if path.suffix.lower() in (*_POINTS, *_RASTERS) and path.is_file())
+    found = [path for path in home.rglob("*") if path.suffix.lower() in (*_POINTS, *_RASTERS) and path.is_file()]
+    # What a virtual raster shows is read through it.
+    shown = {source for path in found if path.suffix.lower() == ".vrt" for source in raster_sources(path)}
+    found = [path for path in found if path.resolve() not in shown]
     return sorted(path for path in found if not any(part.startswith(".") for part in path.relative_to(home).parts))
 
 
@@ -138,7 +152,7 @@ def _tile(home: Path, file: Path, crs: str | None) -> _Tile:
     raster = read_raster_header(file)
     if not raster.square:
         raise InputError(f"{file}: its cells are not square: warp it, for instance with gdalwarp -tr")
-    entry["layer"] = "image" if raster.dtype in ("uint8", "uint16") else "dem"
+    entry["layer"] = "image" if raster.dtype in IMAGE_TYPES else "dem"
     entry["bounds"], entry["gsd"] = list(raster.grid.extent), raster.grid.gsd
     if entry["layer"] == "image":
         entry["bands"] = list(band_names(raster, None))
@@ -146,6 +160,18 @@ def _tile(home: Path, file: Path, crs: str | None) -> _Tile:
         _require_heights(raster)
     entry["sha256"] = checksum(file)
     return _Tile(entry, raster.crs, raster.grid)
+
+
+def _add_chunks(
+    file: Path, entry: dict[str, Any], known: Mapping[str, NDArray[np.float64]], chunks: dict[str, NDArray[np.float64]]
+) -> None:
+    """Add the chunks of a large point file, which is read once for that."""
+    if entry["layer"] != "points" or read_las_header(file, crs="").count < _LARGE:
+        return
+    found = known.get(entry["sha256"])
+    found = read_chunks(file) if found is None else found
+    if found is not None:
+        chunks[entry["sha256"]] = found
 
 
 def _require_heights(raster: RasterHeader) -> None:

@@ -45,10 +45,10 @@ def town_folder(folder, **changes):
     return folder
 
 
-def same_footprints(one, two):
-    """Return which footprints of `one` are in `two`, to a millionth of their area."""
+def same_footprints(one, two, *, least=1e-6):
+    """Return which footprints of `one` are in `two`, to a share of their area."""
     first, second = shapely.STRtree(two.polygons).query(one.polygons, predicate="intersects")
     apart = shapely.area(shapely.symmetric_difference(one.polygons[first], two.polygons[second]))
     found = np.full(len(one), np.inf)
     np.minimum.at(found, first, apart / one.areas[first])
-    return found < 1e-6
+    return found < least

@@ -29,7 +29,7 @@ import roofbench as rb
 STAGES = {
     "cell size": ("preparation", "cell_size"),
     "points to cells": ("preparation", "make_cells"),
-    "classes by EM, textures": ("preparation", "estimate_background"),
+    "classes by EM, textures": ("preparation", "tally_textures"),
     "textures again": ("preparation", "textures"),
     "scores": ("preparation", "score_cells"),
     "superstructures": ("preparation", "lower_superstructures"),

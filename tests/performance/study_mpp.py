@@ -72,7 +72,7 @@ READINGS = {
 FACTORS = (0.5, 2.0)
 NUMBERS = (
     "price", "fit_weight", "least_tau", "low_price", "void_price", "texture_weight", "texture_limit", "least_height",
-    "least_side", "roof_price", "roof_step", "overlap", "ground_error", "effort", "tile", "slender",
+    "least_side", "roof_price", "roof_step", "overlap", "ground_error", "effort", "slender",
     "part_share", "least_evidence",
 )  # fmt: skip
 OTHERS = {

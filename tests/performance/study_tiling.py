@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from mirrored_town import mirror
 
 from roofbench.benchmark.execution.city import City, detect_city
 from roofbench.benchmark.execution.runner import Execution
@@ -22,47 +23,10 @@ from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.core.memory import highest_memory
 from roofbench.detectors.registry import make_detector
 from roofbench.scenes.folder import open_scene
-from roofbench.scenes.geodata.las_files import write_points
-from roofbench.scenes.geodata.points import PointCloud
-from roofbench.scenes.geodata.raster import Elevation, Grid, Image
-from roofbench.scenes.geodata.raster_files import write_elevation, write_image
 from roofbench.scenes.geodata.vector_files import read_footprints, write_footprints
-from roofbench.scenes.importing.tile_index import index_folder
 
 #: Share of the area by which a footprint may differ from its match.
 SAME = 1e-3
-
-
-def mirror(scene, folder, columns, rows):
-    """Write columns x rows copies of a scene, mirrored at their common borders, as a folder of tiles."""
-    xmin, ymin, xmax, ymax = scene.extent
-    width, height = xmax - xmin, ymax - ymin
-    points = scene.points
-    inside = (points.x >= xmin) & (points.x < xmax) & (points.y >= ymin) & (points.y < ymax)
-    points = points.take(inside)
-    for layer in ("points", "dem", "ortho"):
-        (folder / layer).mkdir(parents=True, exist_ok=True)
-    for column in range(columns):
-        for row in range(rows):
-            west, south = xmin + column * width, ymin + row * height
-            x, y = points.x - xmin, points.y - ymin
-            x, y = (width - x if column % 2 else x), (height - y if row % 2 else y)
-            copy = {name: getattr(points, name) for name in PointCloud.__dataclass_fields__}
-            cloud = PointCloud(**{**copy, "x": west + x, "y": south + y})
-            write_points(cloud, folder / "points" / f"{column}_{row}.laz", crs=scene.crs)
-            for layer, raster in (("dem", scene.dem), ("ortho", scene.image)):
-                if raster is None:
-                    continue
-                part = raster.window(scene.extent)
-                step = (slice(None, None, -1 if row % 2 else 1), slice(None, None, -1 if column % 2 else 1))
-                values = np.ascontiguousarray(part.values[..., step[0], step[1]])
-                grid = Grid(west, south + height, part.grid.gsd, *part.grid.shape)
-                name = folder / layer / f"{column}_{row}.tif"
-                if layer == "dem":
-                    write_elevation(Elevation(values, grid), name, crs=scene.crs)
-                else:
-                    write_image(Image(values, part.bands, grid), name, crs=scene.crs)
-    return index_folder(folder).scene
 
 
 def matched(whole, tiled):
@@ -117,7 +81,7 @@ def main():
         if options.only_tiles:
             continue
         scene = open_scene(town)
-        scene.ground_cell = result.measured.ground_cell
+        scene.ground_cell, scene.whole = result.measured.ground_cell, result.measured.whole
         started = time.perf_counter()
         whole = detect(scene, detector.replaced(result.measured.parameters), stream=np.random.default_rng([0]))
         print(f"  the whole: {time.perf_counter() - started:.0f} s, {len(whole)} footprints", flush=True)

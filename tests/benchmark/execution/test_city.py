@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,11 +15,15 @@ from harness.command_line import run
 
 import roofbench as rb
 from roofbench.benchmark.execution.city import City, detect_city
-from roofbench.benchmark.execution.runner import Execution
+from roofbench.benchmark.execution.runner import Execution, run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
-from roofbench.core.errors import OutputError, ParameterError
+from roofbench.benchmark.plan import make_plan
+from roofbench.benchmark.store.writer import Store
+from roofbench.benchmark.suite import read_suite
+from roofbench.core.errors import InputError, OutputError, ParameterError
 from roofbench.detectors.registry import make_detector
-from roofbench.scenes.geodata.las_files import write_points
+from roofbench.scenes.folder import save_scene
+from roofbench.scenes.geodata.las_files import read_points, write_points
 from roofbench.scenes.importing.tile_index import index_folder
 
 HERE = Execution(jobs=0)
@@ -141,25 +146,115 @@ def test_bad_sizes_and_places_are_refused(folder, tmp_path):
         detect(folder, tmp_path / "city.xyz")
 
 
-def test_a_broken_file_costs_its_tiles_alone_and_a_repaired_one_is_computed_then(tmp_path):
-    folder, whole = tmp_path / "tiles", town()
+def columns_of_files(folder, *, overlap=0.0):
+    """The town as three files from west to east that overlap by so many metres on either side."""
+    whole = town()
     folder.mkdir()
     for n in range(3):
-        column = (WEST + 64 * n, SOUTH, WEST + 64 * n + 64, SOUTH + SIDE)
+        column = (WEST + 64 * n - overlap, SOUTH, WEST + 64 * n + 64 + overlap, SOUTH + SIDE)
         write_points(whole.window(column).points, folder / f"{n}.laz", crs="EPSG:25832")
     index_folder(folder)
-    complete, output = tmp_path / "complete", tmp_path / "city.fgb"
-    complete.mkdir()
-    detect(folder, complete / "city.fgb")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def columns(tmp_path_factory):
+    """Three files, and what is detected on them."""
+    place = tmp_path_factory.mktemp("columns")
+    detect(columns_of_files(place / "tiles"), place / "city.fgb")
+    return place / "tiles", (place / "city.fgb").read_bytes()
+
+
+def missing(file):
+    file.unlink()
+
+
+def broken(file):
+    content = file.read_bytes()
+    file.write_bytes(content[:4000] + bytes(len(content) - 8000) + content[-4000:])
+
+
+def of_another_zone(file):
+    write_points(read_points(file), file, crs="EPSG:25833")
+
+
+def in_feet(file):
+    write_points(read_points(file), file, crs="EPSG:2263")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "indexed"), [(missing, False), (broken, False), (broken, True), (of_another_zone, True), (in_feet, True)]
+)
+def test_a_bad_file_costs_its_tiles_alone_and_a_repaired_one_is_computed_then(columns, tmp_path, spoil, indexed):
+    folder, output = tmp_path / "tiles", tmp_path / "city.fgb"
+    shutil.copytree(columns[0], folder)
     content = (folder / "2.laz").read_bytes()
-    (folder / "2.laz").unlink()
-    code, _, message = run("detect", "ndsm[cell=0.5]", folder, "--tile", 64, "-j", 0, "-o", output)
+    spoil(folder / "2.laz")
+    if indexed:
+        code, _, message = run("scenes", "index", folder)
+        # A header can be sound where the points are not.
+        assert code == (0 if spoil is broken else 3)
+        assert spoil is broken or "2.laz is left out" in message
+    words = ("detect", "ndsm[cell=0.5]", folder, "--tile", 64, "-j", 0, "-o", output)
+    code, _, message = run(*words)
     assert code == 3
-    assert "2.laz: no such file" in message
-    assert "tiles failed and are missing" in message
+    assert "2.laz" in message
     assert 0 < len(rb.read_footprints(output)) < len(HOUSES)
     (folder / "2.laz").write_bytes(content)
-    code, _, message = run("detect", "ndsm[cell=0.5]", folder, "--tile", 64, "-j", 0, "-o", output, "--overwrite")
+    assert run("scenes", "index", folder)[0] == 0
+    code, _, message = run(*words, "--overwrite")
     assert code == 0, message
     assert "finished before" in message
-    assert output.read_bytes() == (complete / "city.fgb").read_bytes()
+    assert output.read_bytes() == columns[1]
+
+
+def test_files_that_overlap_give_what_files_side_by_side_give(columns, tmp_path):
+    detect(columns_of_files(tmp_path / "tiles", overlap=7.0), tmp_path / "city.fgb")
+    (tmp_path / "apart.fgb").write_bytes(columns[1])
+    one, two = rb.read_footprints(tmp_path / "city.fgb"), rb.read_footprints(tmp_path / "apart.fgb")
+    assert len(one) == len(two)
+    # The ground is filtered from the points, whose order differs.
+    assert same_footprints(one, two, least=1e-3).all()
+
+
+SUITE = """
+[[scenes]]
+path = "town"
+tile = 64
+[[detectors]]
+use = "ndsm"
+cell = 0.5
+[[detectors]]
+use = "original"
+"""
+
+
+def test_a_city_in_a_suite_is_detected_tile_by_tile_and_scored(tmp_path, monkeypatch):
+    whole = town()
+    reference = rb.Footprints.of([shapely.box(*box) for box in HOUSES.values()], crs=whole.crs)
+    layers = {"points": whole.points, "dem": whole.dem, "reference": reference}
+    save_scene(rb.Scene(whole.name, whole.extent, crs=whole.crs, **layers), tmp_path / "town")
+    suite, store = tmp_path / "suite.toml", tmp_path / "a.sqlite"
+    suite.write_text(SUITE)
+    recipe, seen = SceneRecipe.of_folder(tmp_path / "town", tile=64), []
+    window = rb.Scene.window
+    monkeypatch.setattr(rb.Scene, "window", lambda self, *args: seen.append(args) or window(self, *args))
+    with Store(store) as opened:
+        rows = run_plan(make_plan(read_suite(suite), opened), opened, execution=HERE).rows
+    assert len(seen) > 16
+    ok, skipped = sorted(rows, key=lambda row: row.status)
+    assert (ok.status, ok.detected) == ("ok", len(HOUSES))
+    assert skipped.status == "skipped"
+    assert "no orthoimage" in skipped.reason
+    assert recipe.key != SceneRecipe.of_folder(tmp_path / "town").key
+    detect_city(recipe, NDSM, tmp_path / "city.gpkg", City(tile=64.0), execution=HERE)
+    with Store(store) as stored:
+        assert same_footprints(rb.read_footprints(tmp_path / "city.gpkg"), stored.detections(ok.id)).all()
+
+
+def test_a_tile_of_a_suite_is_checked(tmp_path):
+    town_folder(tmp_path / "town")
+    suite = tmp_path / "suite.toml"
+    suite.write_text(SUITE.replace("64", "3"))
+    with pytest.raises(InputError, match="line 4: tile must be from 16 to 100000 metres, not 3"):
+        read_suite(suite)

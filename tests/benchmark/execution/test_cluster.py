@@ -5,11 +5,13 @@ import signal
 import socket
 import subprocess
 import sys
-import time
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
+from builders.town import town_folder
 
+from roofbench.benchmark.execution.city import City, detect_city
 from roofbench.benchmark.execution.isolation import close_isolated
 from roofbench.benchmark.execution.runner import Execution, run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
@@ -64,8 +66,9 @@ def test_limits_hold_on_a_cluster(suite, tmp_path, misbehaving):
     assert {reason for _, reason, *_ in found.values()} == {"time limit of 2 s exceeded"}
 
 
-@pytest.mark.slow
-def test_a_worker_killed_in_mid_run_does_not_stop_the_sweep(suite, tmp_path, misbehaving):
+@contextmanager
+def separate_processes(folder):
+    """Start a scheduler and two workers as processes; yield the address and the first worker."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -76,33 +79,59 @@ def test_a_worker_killed_in_mid_run_does_not_stop_the_sweep(suite, tmp_path, mis
         command = [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]]
         return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
-    worker = ("dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", tmp_path)
+    worker = ("dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", folder)
     processes = [start("dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")]
     try:
         processes += [start(*map(str, worker)) for _ in range(2)]
         with distributed.Client(address, timeout="30s") as client:
             client.wait_for_workers(2, timeout=60)
-        slow = replace(suite, detectors=(DetectorEntry(make_detector(misbehaving, {"seconds": 0.5}), tuple(range(6))),))
-        victim = processes[1]
-        killed = []
-
-        def kill_one(run, outcome):
-            if not killed:
-                victim.send_signal(signal.SIGKILL)
-                killed.append(time.monotonic())
-
-        with Store(tmp_path / "a.sqlite") as store:
-            plan = make_plan(slow, store)
-            result = run_plan(plan, store, execution=Execution(scheduler=address), progress=kill_one)
-        assert killed
-        assert victim.wait(timeout=30) == -signal.SIGKILL
-        assert [row.status for row in result.rows] == ["ok"] * 12
-        here = run(slow, tmp_path / "here.sqlite", Execution(jobs=1))
-        assert {row.key: row.detected for row in result.rows} == {key: found[2] for key, found in here.items()}
+        yield address, processes[1]
     finally:
         for process in reversed(processes):
             process.kill()
             process.wait()
+
+
+class Killing:
+    """A progress callback that kills a process when the first result arrives."""
+
+    def __init__(self, victim):
+        self.victim, self.killed = victim, False
+
+    def __call__(self, *_):
+        if not self.killed:
+            self.victim.send_signal(signal.SIGKILL)
+            self.killed = True
+
+
+@pytest.mark.slow
+def test_a_worker_killed_in_mid_run_does_not_stop_the_sweep(suite, tmp_path, misbehaving):
+    slow = replace(suite, detectors=(DetectorEntry(make_detector(misbehaving, {"seconds": 0.5}), tuple(range(6))),))
+    with separate_processes(tmp_path) as (address, victim), Store(tmp_path / "a.sqlite") as store:
+        kill = Killing(victim)
+        result = run_plan(make_plan(slow, store), store, execution=Execution(scheduler=address), progress=kill)
+        assert kill.killed
+        assert victim.wait(timeout=30) == -signal.SIGKILL
+    assert [row.status for row in result.rows] == ["ok"] * 12
+    here = run(slow, tmp_path / "here.sqlite", Execution(jobs=1))
+    assert {row.key: row.detected for row in result.rows} == {key: found[2] for key, found in here.items()}
+
+
+@pytest.mark.slow
+def test_a_city_on_a_cluster_is_the_same_bytes_though_a_worker_is_killed(tmp_path):
+    recipe = SceneRecipe.of_folder(town_folder(tmp_path / "town"))
+    for name in ("here", "there"):
+        (tmp_path / name).mkdir()
+    detector, city = make_detector("ndsm[cell=0.5]"), City(tile=32.0)
+    detect_city(recipe, detector, tmp_path / "here" / "city.fgb", city, execution=Execution(jobs=0))
+    with separate_processes(tmp_path) as (address, victim):
+        kill = Killing(victim)
+        there, execution = tmp_path / "there" / "city.fgb", Execution(scheduler=address)
+        result = detect_city(recipe, detector, there, city, execution=execution, progress=kill)
+        assert kill.killed
+        assert victim.wait(timeout=30) == -signal.SIGKILL
+    assert not result.failed
+    assert there.read_bytes() == (tmp_path / "here" / "city.fgb").read_bytes()
 
 
 def test_a_scheduler_that_does_not_answer_is_one_sentence(suite, tmp_path, monkeypatch):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from naive import mpp as naive
 
-from roofbench.detectors.mpp.background import Background, estimate_background
+from roofbench.detectors.mpp.background import Background, estimate_background, tally_textures
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, Cells, cell_size
 from roofbench.detectors.mpp.rectangles import inside_any
 from roofbench.detectors.mpp.scores import Weights, fitted_cells, mean_evidence, restrain
@@ -45,9 +45,11 @@ def test_classes_and_fitted_cells_are_those_of_the_evidence_for_any_number_of_th
     height[rough] += rng.integers(0, 300, np.count_nonzero(rough))
     openness = np.where(rough, rng.integers(0, 256, state.shape), 3).astype(np.uint8)
     cells = Cells(grid, np.where(state == HIGH, height, 0).astype(np.int32), state, openness)
-    alone, bins = estimate_background(cells)
+    tally, bins = tally_textures(cells)
+    alone = estimate_background(tally, grid.gsd)
     with started_threads(count) as threads:
-        background, same = estimate_background(cells, threads=threads)
+        counted, same = tally_textures(cells, threads=threads)
+        background = estimate_background(counted, grid.gsd)
         fitted = fitted_cells(cells, bins, background, WEIGHTS, threads=threads)
     assert background == alone
     np.testing.assert_array_equal(same, bins)

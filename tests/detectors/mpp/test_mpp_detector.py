@@ -8,8 +8,8 @@ import pytest
 import shapely
 
 from roofbench.core.errors import ParameterError
-from roofbench.detectors.mpp import city
-from roofbench.detectors.mpp.tiles import tiles_of
+from roofbench.detectors.mpp import whole_scene
+from roofbench.detectors.mpp.squares import rounds_of
 from roofbench.detectors.registry import make_detector
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid
@@ -78,9 +78,9 @@ def test_the_record_holds_the_convergence_as_json():
 
 
 @pytest.mark.slow
-def test_same_seed_same_bits_with_any_number_of_threads_and_tiles_in_any_order():
+def test_same_seed_same_bits_with_any_number_of_threads_and_squares():
     points = cloud(1)
-    small = "mpp[level=part,tile=40,largest_side=20,threads={}]"
+    small = "mpp[level=part,largest_side=30,threads={}]"
     one = detect(points, small.format(1))
     assert len(one) >= 3
     assert wkb(one) == wkb(detect(points, small.format(2))) == wkb(detect(points, small.format(3)))
@@ -92,10 +92,10 @@ def test_order_of_points_does_not_matter():
     assert wkb(detect(points)) == wkb(detect(points.take(order)))
 
 
-def test_a_large_scene_in_tiles_finds_what_one_tile_finds():
+def test_a_large_scene_in_squares_finds_what_one_square_finds():
     points = cloud(3)
-    whole, tiled = detect(points), detect(points, "mpp[level=part,tile=40,largest_side=40]")
-    assert len(tiles_of(Grid.covering(EXTENT, 0.5), 80.0)) > 1
+    whole, tiled = detect(points), detect(points, "mpp[level=part,largest_side=32]")
+    assert len(rounds_of(Grid.covering(EXTENT, 0.5), EXTENT, 32.0).chains) > 1
     assert len(whole) == len(tiled)
     shared = shapely.area(shapely.intersection(shapely.union_all(whole.polygons), shapely.union_all(tiled.polygons)))
     assert shared > 0.93 * max(whole.areas.sum(), tiled.areas.sum())
@@ -207,8 +207,8 @@ def test_every_parameter_has_a_meaning_and_a_source():
 
 
 def test_without_births_from_data_the_sampler_still_finds_the_houses(monkeypatch):
-    monkeypatch.setattr(city, "_DATA_BIRTHS", 0.0)
-    monkeypatch.setattr(city, "_HOT", 30.0)
+    monkeypatch.setattr(whole_scene, "_DATA_BIRTHS", 0.0)
+    monkeypatch.setattr(whole_scene, "_HOT", 30.0)
     found = detect(cloud(7), "mpp[start=empty,effort=30]")
     truth = shapely.union_all([shapely.box(*roof[:4]) for roof in ROOFS])
     assert shapely.intersection(shapely.union_all(found.polygons), truth).area > 0.85 * truth.area

@@ -8,8 +8,10 @@ from builders.small_scenes import CRS, SOUTH, WEST, cloud, image, scene
 
 from roofbench.core.errors import CRSError, InputError
 from roofbench.scenes.folder import changed_files, open_scene, save_scene
-from roofbench.scenes.geodata.las_files import write_points
+from roofbench.scenes.geodata.las_files import read_points, write_points
+from roofbench.scenes.geodata.point_chunks import read_chunk_index, write_chunk_index
 from roofbench.scenes.geodata.raster_files import write_elevation, write_image
+from roofbench.scenes.importing import tile_index
 from roofbench.scenes.importing.tile_index import index_folder
 
 WHOLE = (WEST, SOUTH, WEST + 40, SOUTH + 40)
@@ -83,7 +85,7 @@ def test_files_that_cannot_be_used_are_named_and_the_others_are_indexed(tiles):
     named = sorted(problem.partition(" ")[0] for problem in found.problems)
     assert named == ["ortho/coarse.tif", "points/0.laz", "points/feet.laz", "points/other.laz"]
     assert len(found.scene.window((WEST + 25, SOUTH + 25, WEST + 35, SOUTH + 35)).points) > 0
-    assert tomllib.loads((tiles / "scene.toml").read_text())["notes"] == list(found.problems)
+    assert tomllib.loads((tiles / "scene.toml").read_text())["left_out"] == list(found.problems)
 
 
 def test_points_of_noise_are_left_out(tmp_path):
@@ -123,3 +125,24 @@ def test_reference_and_area_belong_to_the_scene(tiles):
     found = index_folder(tiles).scene
     assert len(found.reference) == 2
     assert found.area is not None
+
+
+@pytest.mark.parametrize("ending", ["laz", "las"])
+def test_a_window_of_a_large_file_reads_the_chunks_that_it_meets(tmp_path, monkeypatch, ending):
+    monkeypatch.setattr(tile_index, "_LARGE", 1)
+    whole, file = cloud(160_000), tmp_path / f"a.{ending}"
+    points = whole.take(np.argsort(whole.x, kind="stable"))
+    write_points(points, file, crs=CRS)
+    opened = index_folder(tmp_path).scene
+    extent = (WEST + 30, SOUTH + 5, WEST + 36, SOUTH + 30)
+    seen = []
+    ((sha, bounds),) = read_chunk_index(tmp_path).items()
+    assert len(bounds) == 4
+    read_points(file, window=extent, chunks={file: bounds}, progress=lambda *counts: seen.append(counts))
+    assert seen[-1] == (50_000, 160_000)
+    part, same = opened.window(extent).points, points.window(extent)
+    assert np.array_equal(part.x, same.x)
+    assert np.array_equal(part.classification, same.classification)
+    # An index that does not fit the file is not used.
+    write_chunk_index(tmp_path, {sha: bounds[:1]})
+    assert np.array_equal(open_scene(tmp_path).window(extent).points.x, same.x)

@@ -1,14 +1,13 @@
-"""The whole scene: every tile annealed, a local search along the seams, the traces of all tiles added up."""
+"""The whole scene: every square annealed, a local search along their borders, the traces of all added up."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import shapely
 
-from .annealing import Annealed, Schedule, anneal, search
+from .annealing import Annealed, Boxes, Schedule, anneal, room_of, search
 from .arrays import Floats, Rectangles
 from .moves import Move
 from .parameters import MPPParameters
@@ -16,13 +15,13 @@ from .preparation import Prepared
 from .random_stream import stream
 from .rectangles import corners
 from .sampler import ChainSchedule, Trace
+from .squares import Square, process_squares, rounds_of
 from .strips import absorb_strips
 from .threads import Threads
-from .tiles import Tile, process_tiles, tiles_of
 from .walls import close_walls
 from .windows import Window
 
-__all__ = ["join_traces", "sample_city", "total_energy"]
+__all__ = ["join_traces", "sample_scene", "total_energy"]
 
 #: First and last temperature of the chain.
 _HOT, _COLD = 3.0, 0.1
@@ -36,53 +35,56 @@ _MERGE_REACH = 20.0
 _PER_AREA, _PER_BOX = 0.2, 60
 #: Rows of a trace.
 _ROWS = 100
-#: Along the seams: maximum number of local-search sweeps, and buildings that a window may hold besides the present
-#: ones.
+#: Along the borders of squares: maximum number of local-search sweeps, and buildings that a square may hold besides the
+#: present ones.
 _SEAM_SWEEPS, _SEAM_ROOM = 4, 64
 #: Share of the energy of a rectangle by which an edge that closes a wall may raise it.
 _WALL_TOLERANCE = 0.25
 
 
-def sample_city(
-    parameters: MPPParameters, prepared: Prepared, seed: int, threads: Threads
+def sample_scene(
+    parameters: MPPParameters, prepared: Prepared, seed: int, core: tuple[float, float, float, float], threads: Threads
 ) -> tuple[Rectangles, list[Annealed]]:
-    """Anneal every tile, then search along the seams, close the walls and absorb parts of larger buildings."""
+    """Anneal every square, search along their borders, close the walls and absorb parts of larger buildings.
+
+    Of a window only the squares on which its core (metres) depends are annealed.
+    """
     grid, model, tables = prepared.grid, prepared.model, prepared.tables
-    size = max(parameters.tile, 2.0 * parameters.largest_side)
-    reach = math.sqrt(2.0) * model.largest_side
+    rounds = rounds_of(grid, core, parameters.largest_side)
     results: dict[tuple[int, int], Annealed] = {}
 
-    def window_of(tile: Tile, fixed: Rectangles) -> Window:
-        return Window(tables, model, np.array(tile.window), _within_reach(fixed, tile, model.largest_side))
+    def boxes_of(square: Square) -> Boxes:
+        return prepared.boxes.take(square.owns(prepared.boxes.rectangles))
 
-    def annealed(tile: Tile, own: Rectangles, fixed: Rectangles) -> Rectangles:
-        boxes = prepared.boxes.take(tile.owns(prepared.boxes.rectangles))
-        state = stream([seed, tile.column % 2**32, tile.row % 2**32])
-        schedule = _schedule(parameters, tile, grid.gsd, len(boxes))
-        result = anneal(window_of(tile, fixed), boxes, own, schedule, state)
-        results[tile.column, tile.row] = result
+    def started(square: Square, own: Rectangles, fixed: Rectangles) -> Rectangles:
+        window, boxes = Window(tables, model, square.edges, fixed), boxes_of(square)
+        return search(window, own, boxes, capacity=room_of(boxes, own), sweeps=parameters.sweeps)
+
+    def annealed(square: Square, own: Rectangles, fixed: Rectangles) -> Rectangles:
+        window, boxes = Window(tables, model, square.edges, fixed), boxes_of(square)
+        state = stream([seed, square.column % 2**32, square.row % 2**32])
+        result = anneal(window, boxes, own, _schedule(parameters, square, grid.gsd, len(boxes)), state)
+        results[square.column, square.row] = result
         return result.rectangles
 
-    def searched(tile: Tile, own: Rectangles, fixed: Rectangles) -> Rectangles:
-        boxes = prepared.boxes.take(tile.owns(prepared.boxes.rectangles))
-        sweeps = min(parameters.sweeps, _SEAM_SWEEPS)
-        return search(window_of(tile, fixed), own, boxes, capacity=len(own) + _SEAM_ROOM, sweeps=sweeps)
+    def joined(square: Square, own: Rectangles, fixed: Rectangles) -> Rectangles:
+        window, sweeps = Window(tables, model, square.edges, fixed), min(parameters.sweeps, _SEAM_SWEEPS)
+        return search(window, own, boxes_of(square), capacity=len(own) + _SEAM_ROOM, sweeps=sweeps)
 
-    tiles = tiles_of(grid, size)
-    rectangles = process_tiles(tiles, np.empty((0, 5)), annealed, reach=reach, threads=threads)
-    if len(tiles) > 1:
-        rectangles = process_tiles(
-            tiles_of(grid, size, shifted=True), rectangles, searched, reach=reach, threads=threads
-        )
+    rectangles, largest = np.empty((0, 5)), model.largest_side
+    if parameters.start == "greedy":
+        rectangles = process_squares(rounds.greedy, rectangles, started, largest=largest, threads=threads)
+    rectangles = process_squares(rounds.chains, rectangles, annealed, largest=largest, groups=1, threads=threads)
+    rectangles = process_squares(rounds.shifted, rectangles, joined, largest=largest, threads=threads)
     rectangles = np.ascontiguousarray(rectangles[np.lexsort(rectangles.T)])
     close_walls(tables, model, rectangles, _WALL_TOLERANCE * parameters.price)
     rectangles = absorb_strips(tables, model, rectangles, slender=parameters.slender, part_share=parameters.part_share)
     return rectangles, [results[key] for key in sorted(results)]
 
 
-def _schedule(parameters: MPPParameters, tile: Tile, cell: float, boxes: int) -> Schedule:
-    """Return how a tile is processed: proposals by its area, and for each box."""
-    x0, y0, x1, y1 = tile.window
+def _schedule(parameters: MPPParameters, square: Square, cell: float, boxes: int) -> Schedule:
+    """Return how a square is processed: proposals by its area, and for each box."""
+    x0, y0, x1, y1 = square.edges.tolist()
     area = (x1 - x0) * (y1 - y0) * cell * cell
     proposals = max(int(parameters.effort * (_PER_AREA * area + _PER_BOX * boxes)), 1)
     chain = ChainSchedule(
@@ -99,14 +101,6 @@ def _schedule(parameters: MPPParameters, tile: Tile, cell: float, boxes: int) ->
     return Schedule(chain=chain, data_share=_DATA_BIRTHS, greedy=greedy, sweeps=parameters.sweeps)
 
 
-def _within_reach(fixed: Rectangles, tile: Tile, largest: float) -> Rectangles:
-    """Return the fixed buildings that one centred in the tile can overlap."""
-    x0, y0, x1, y1 = tile.window
-    x, y = fixed[:, 0], fixed[:, 1]
-    apart = np.hypot(np.maximum(np.maximum(x0 - x, x - x1), 0), np.maximum(np.maximum(y0 - y, y - y1), 0))
-    return fixed[apart < 0.5 * (np.hypot(fixed[:, 2], fixed[:, 3]) + math.sqrt(2.0) * largest)]
-
-
 def total_energy(prepared: Prepared, rectangles: Rectangles, energies: Floats) -> float:
     """Return U of a whole scene from the energies of its buildings by themselves."""
     polygons = shapely.polygons(corners(rectangles))
@@ -117,9 +111,9 @@ def total_energy(prepared: Prepared, rectangles: Rectangles, energies: Floats) -
 
 
 def join_traces(results: list[Annealed], rows: int = _ROWS) -> dict[str, Any]:
-    """Add up the traces of all tiles at equal shares of their schedules.
+    """Add up the traces of all squares at equal shares of their schedules.
 
-    Every tile runs the same schedule on its own number of proposals, so that the temperature at a share is the same.
+    Every square runs the same schedule on its own number of proposals, so that the temperature at a share is the same.
     """
     results = [result for result in results if len(result.trace)]
     if not results:
