@@ -18,11 +18,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
@@ -30,7 +29,7 @@ from ..tally import Tallies
 from .exact_sum import exact_sum
 from .groups import Members, connected_groups
 from .overlaps import Overlaps
-from .polygon_overlay import common_ground
+from .polygon_overlay import common_ground, united_area
 
 __all__ = ["AreaTally", "UnionAreas", "exact_areas", "mask_areas", "tally_areas"]
 
@@ -252,6 +251,5 @@ def _united(detected: Footprints, reference: Footprints, kind: str, members: Mem
         ground = sides[0].polygons[members.one[part]]
         if kind == "pairs":
             ground = common_ground(ground, sides[1].polygons[members.two[part]])
-        # One after the other: the union of many at once can lose a polygon that touches others (GEOS 3.14).
-        areas[group] = reduce(shapely.union, ground).area
+        areas[group] = united_area(ground)
     return areas

@@ -22,7 +22,7 @@ from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprints import Footprints
 from .left_out import Counted, LeftOut, counted_detections, counted_references
 from .overlaps import Overlaps, overlaps_between
-from .polygon_overlay import common_ground
+from .polygon_overlay import common_ground, united_area
 
 __all__ = ["CountedSets", "Coverage", "counted_sets"]
 
@@ -153,5 +153,5 @@ def _coverage(
         order = np.argsort(row[several], kind="stable")
         rows, start = np.unique(row[several][order], return_index=True)
         for number, group in zip(rows.tolist(), np.split(ground[order], start[1:]), strict=True):
-            covered[number] = shapely.area(shapely.union_all(group))
+            covered[number] = united_area(group)
     return Coverage(np.clip(covered / own.areas, 0.0, 1.0), touched, partner, shared)

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 __all__ = ["accept_in_order"]
 
+#: Fewer pairs are accepted one by one; so are those that are left after so many rounds.
+_FEW, _ROUNDS = 500, 50
+
 
 def accept_in_order(
     detections: NDArray[np.int64], references: NDArray[np.int64], counts: tuple[int, int]
@@ -33,22 +36,20 @@ def accept_in_order(
     """
     of_detection = np.full(counts[0], -1, dtype=np.int64)
     of_reference = np.full(counts[1], -1, dtype=np.int64)
-    # A pair whose two sides occur nowhere else is accepted in any order: only contested pairs need the loop.
-    lonely = (np.bincount(detections, minlength=counts[0])[detections] == 1) & (
-        np.bincount(references, minlength=counts[1])[references] == 1
-    )
-    of_detection[detections[lonely]] = references[lonely]
-    of_reference[references[lonely]] = detections[lonely]
-    taken_detections, taken_references = set(), set()
-    accepted = []
-    contested = zip(detections[~lonely].tolist(), references[~lonely].tolist(), strict=True)
-    for detection, reference in contested:
-        if detection not in taken_detections and reference not in taken_references:
-            taken_detections.add(detection)
-            taken_references.add(reference)
-            accepted.append((detection, reference))
-    if accepted:
-        rows = np.array(accepted, dtype=np.int64)
-        of_detection[rows[:, 0]] = rows[:, 1]
-        of_reference[rows[:, 1]] = rows[:, 0]
+    first = np.empty(counts[0], dtype=np.int64), np.empty(counts[1], dtype=np.int64)
+    # A pair that comes first on both of its sides is accepted whatever follows, and many are so at once.
+    for _ in range(_ROUNDS):
+        if len(detections) < _FEW:
+            break
+        place = np.arange(len(detections))
+        for side, rows in zip(first, (detections, references), strict=True):
+            side[rows[::-1]] = place[::-1]  # later assignments win
+        accepted = (first[0][detections] == place) & (first[1][references] == place)
+        of_detection[detections[accepted]] = references[accepted]
+        of_reference[references[accepted]] = detections[accepted]
+        free = (of_detection[detections] < 0) & (of_reference[references] < 0)
+        detections, references = detections[free], references[free]
+    for detection, reference in zip(detections.tolist(), references.tolist(), strict=True):
+        if of_detection[detection] < 0 and of_reference[reference] < 0:
+            of_detection[detection], of_reference[reference] = reference, detection
     return of_detection, of_reference

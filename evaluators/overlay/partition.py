@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
@@ -26,7 +24,7 @@ from .outline_arrays import Outlines, polygons_of
 from .outline_overlaps import shared_by_outlines, shared_within
 from .outline_store import Division, OutlineStore, StoredPart, part_of_points
 from .overlaps import NUMERICAL_ZERO, Overlaps
-from .polygon_overlay import common_ground
+from .polygon_overlay import common_ground, united_area
 from .united import united_areas
 from .vertex_distances import ring_distances
 
@@ -258,6 +256,6 @@ def united_from_stores(
             ground = polygons_of(outlines[0], few.one[inside])
             if kind == "pairs":
                 ground = common_ground(ground, polygons_of(outlines[1], few.two[inside]))
-            areas[begin + group] = reduce(shapely.union, ground).area
+            areas[begin + group] = united_area(ground)
         begin = end
     return areas

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, overload
 
@@ -269,7 +269,12 @@ class Footprints(Displayed):
                 f"{self.source}: footprints are joined over gaps of more than 0 and up to {_WIDEST_GAP:g} m, "
                 f"not {gap:g} m"
             )
-        grown = shapely.union_all(shapely.buffer(self.polygons, gap / 2, join_style="mitre"))
+        parts = shapely.buffer(self.polygons, gap / 2, join_style="mitre")
+        grown = shapely.union_all(parts)
+        # The union of many at once can lose one that touches others (GEOS 3.14).
+        shapely.prepare(grown)
+        lost = ~shapely.intersects(grown, shapely.point_on_surface(parts))
+        grown = reduce(shapely.union, parts[lost], grown)
         blocks = shapely.get_parts(shapely.buffer(grown, -gap / 2, join_style="mitre"))
         return Footprints.of(blocks, crs=self.crs, source=f"{self.source} (joined over gaps below {gap:g} m)")
 

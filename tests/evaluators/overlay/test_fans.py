@@ -58,6 +58,19 @@ def test_shared_areas_are_those_of_exact_rationals(offset):
         assert area_of(one, two) == pytest.approx(float(exact_area(one, two)), abs=1e-12 * two.area)
 
 
+@pytest.mark.parametrize("offset", [0.0, 6e6])
+@pytest.mark.parametrize("slip", [0.0, 1e-9, 1e-7])
+def test_edges_that_nearly_coincide_are_measured_as_exact_rationals_do(offset, slip):
+    rng = np.random.default_rng(9)
+    for _ in range(40):
+        angle, x, y = rng.uniform(0, 360), *(rng.uniform(-4, 4, 2) + offset)
+        house = shapely.affinity.rotate(shapely.box(x, y, x + 9.1, y + 7.3), angle, origin=(x, y))
+        hole = shapely.affinity.rotate(shapely.box(x + 2, y + 2, x + 5, y + 4), angle, origin=(x, y))
+        copy = shapely.affinity.translate(shapely.affinity.rotate(house, slip, origin=(x, y)), slip, -slip)
+        exact = exact_area(house, copy) - exact_area(hole, copy)
+        assert area_of(house - hole, copy) == pytest.approx(float(exact), abs=1e-12 * copy.area + 1e-9)
+
+
 grid = st.integers(0, 6)
 boxes = st.tuples(grid, grid, st.integers(1, 5), st.integers(1, 5))
 
