@@ -69,9 +69,7 @@ class Overlaps:
     ) -> Overlaps:
         """Keep the pairs that share area; `sizes` are the areas of the footprints of both sets, m2."""
         smaller = np.minimum(sizes[0][first], sizes[1][second])
-        found = cls(first, second, area, area > NUMERICAL_ZERO * smaller)
-        shares = area > 0
-        return found if shares.all() else found.where(shares)
+        return cls(first, second, area, area > NUMERICAL_ZERO * smaller).where(area > 0)
 
     def __len__(self) -> int:
         return len(self.first)
@@ -83,6 +81,8 @@ class Overlaps:
 
     def where(self, mask: NDArray[np.bool_]) -> Overlaps:
         """Return the pairs at `mask`."""
+        if mask.all():
+            return self
         return Overlaps(self.first[mask], self.second[mask], self.area[mask], self.significant[mask])
 
 

@@ -53,6 +53,13 @@ class PairTable:
     outline: NDArray[np.float64]
     polis: NDArray[np.float64]
 
+    def only_significant(self) -> PairTable:
+        """Return the pairs that overlap in the sense of the evaluation."""
+        kept = self.overlaps.significant
+        if kept.all():
+            return self
+        return PairTable(self.overlaps.where(kept), self.outline[kept], self.polis[kept])
+
     def places(self, first: NDArray[np.int64], second: NDArray[np.int64], width: int) -> NDArray[np.int64]:
         """Return where these pairs stand; `width` is the number of footprints of the second side."""
         keys = self.overlaps.first * width + self.overlaps.second

@@ -227,9 +227,10 @@ def _linked(
     table: PairTable,
     within: tuple[Overlaps, Overlaps],
 ) -> Links:
+    table = table.only_significant()
     graph = overlap_graph(
         *sides,
-        table.overlaps.only_significant,
+        table.overlaps,
         within,
         matching=evaluator.matching,
         minimum_area=evaluator.minimum_area,
