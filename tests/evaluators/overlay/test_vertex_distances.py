@@ -56,7 +56,7 @@ def test_many_quadrilaterals_have_the_corner_distances_of_few(monkeypatch):
 
 
 def test_many_polygons_are_checked_as_few_are(monkeypatch):
-    monkeypatch.setattr("roofbench.scenes.geodata.footprints._CHUNK", 8)
+    monkeypatch.setattr("roofbench.scenes.geodata.polygon_repair._CHUNK", 8)
     bow_tie = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
     dart = shapely.Polygon([(0, 0), (4, 0), (1, 1), (0, 4)])
     flat = shapely.Polygon([(6e6, 6e6), (6e6 + 10, 6e6), (6e6 + 20, 6e6 + 1e-9), (6e6 + 5, 6e6 + 3)])

@@ -77,8 +77,8 @@ def test_whatever_is_doubtful_is_left_to_geos(points):
 def test_large_sets_are_repaired_as_small_ones(monkeypatch):
     polygons = rings(np.random.default_rng(5), 500)
     expected = rb.Footprints.of(polygons)
-    monkeypatch.setattr("roofbench.scenes.geodata.footprints._CHUNK", 10)
-    monkeypatch.setattr("roofbench.scenes.geodata.footprints._MANY", 100)
+    monkeypatch.setattr("roofbench.scenes.geodata.polygon_repair._CHUNK", 10)
+    monkeypatch.setattr("roofbench.scenes.geodata.polygon_repair._MANY", 100)
     found = rb.Footprints.of(polygons)
     assert found.repairs == expected.repairs
     assert shapely.equals_exact(found.polygons, expected.polygons).all()
