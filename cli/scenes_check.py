@@ -20,18 +20,26 @@ def check(
         bool, typer.Option("--update-checksums", help="Accept edited files: write their checksums into the manifest.")
     ] = False,
 ) -> None:
-    """Check a scene folder and print its contents; exit code 2 when there is a problem."""
+    """Check a scene folder and print its contents; exit code 2 when there is a problem.
+
+    Warnings name references of different buildings that overlap; they are no problem: registers have some.
+    """
+    from ..evaluators.overlay.reference_overlaps import reference_warnings
     from ..reports.scene_text import format_facts
     from ..scenes.checking import check_scene
-    from ..scenes.folder import update_checksums
+    from ..scenes.folder import open_scene, update_checksums
 
     for name in update_checksums(scene) if update else ():
         typer.echo(f"- {name} was edited; its new checksum is in the manifest", err=True)
     report = check_scene(scene)
+    reference = open_scene(scene).reference if "reference" in report.facts else None
+    warnings = () if reference is None else reference_warnings(reference)
     if form == "json":
-        typer.echo(json.dumps({"facts": report.facts, "problems": report.problems}, indent=2))
+        typer.echo(json.dumps({"facts": report.facts, "problems": report.problems, "warnings": warnings}, indent=2))
     else:
         typer.echo(format_facts(report.facts), nl=False)
+    for warning in warnings:
+        typer.echo(f"Warning: {warning}", err=True)
     for problem in report.problems:
         typer.echo(f"Error: {problem}", err=True)
     if report.problems:

@@ -26,8 +26,9 @@ from .overlay.areas import mask_areas
 from .overlay.corner_matching import match_corners
 from .overlay.coverage import CountedSets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import LeftOut, left_out_notes, repair_notes
+from .overlay.left_out import LeftOut, left_out_notes
 from .overlay.outline_distances import pair_distances
+from .overlay.reference_overlaps import input_notes
 from .overlay.turning import turning_distances
 from .tally import Histogram, Tallies, histogram
 from .threshold_free.correspondence import MATCHINGS
@@ -354,7 +355,9 @@ class Boundary(Evaluator):
             hausdorff=_METRES().filled(pairs.values["hausdorff"]),
         )
         return self.summarise(
-            tallies, list(repair_notes(detected, reference)), find_verdicts=lambda: self._verdicts(graph, pairs)
+            tallies,
+            list(input_notes(detected, reference, graph.within[1])),
+            find_verdicts=lambda: self._verdicts(graph, pairs),
         )
 
     def notes_of(self, tallies: Any) -> Sequence[str]:

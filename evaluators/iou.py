@@ -28,8 +28,9 @@ from .index import IndexGroup, index, ratio
 from .overlay.coverage import CountedSets, counted_sets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
 from .overlay.greedy import accept_in_order
-from .overlay.left_out import Counted, LeftOut, left_out_notes, repair_notes
+from .overlay.left_out import Counted, LeftOut, left_out_notes
 from .overlay.overlaps import overlaps_between
+from .overlay.reference_overlaps import input_notes
 from .tally import Tallies
 from .verdict_table import Measure, Verdicts
 
@@ -283,7 +284,7 @@ class IoU(Evaluator):
         )
         return self.summarise(
             tallies,
-            list(repair_notes(detected, reference)),
+            list(input_notes(detected, reference)),
             find_verdicts=lambda: self._verdicts(sets, candidates, of_detection, of_reference),
         )
 

@@ -19,7 +19,8 @@ from .base import Evaluation, Evaluator
 from .index import IndexGroup, index, ratio
 from .overlay.coverage import CountedSets, counted_sets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import LeftOut, left_out_notes, repair_notes
+from .overlay.left_out import LeftOut, left_out_notes
+from .overlay.reference_overlaps import input_notes
 from .tally import Tallies
 from .verdict_table import Measure, Verdicts
 
@@ -119,7 +120,7 @@ class Mobj0(Evaluator):
         )
         return self.summarise(
             _Tallies(counts=counts, left_out=sets.left_out),
-            list(repair_notes(detected, reference)),
+            list(input_notes(detected, reference)),
             find_verdicts=lambda: self._verdicts(sets),
         )
 

@@ -27,7 +27,8 @@ from .base import Evaluation, Evaluator
 from .index import Curve, IndexGroup, index, ratio
 from .overlay.coverage import CountedSets, Coverage, counted_sets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import LeftOut, left_out_notes, repair_notes
+from .overlay.left_out import LeftOut, left_out_notes
+from .overlay.reference_overlaps import input_notes
 from .tally import Histogram, Tallies, histogram
 from .verdict_table import Measure, Verdicts
 
@@ -307,7 +308,7 @@ class Rutzinger(Evaluator):
             detection_sizes_correct=no_sizes.filled(detected.areas[d & correct]),
         )
         return self.summarise(
-            tallies, list(repair_notes(detected, reference)), find_verdicts=lambda: self._verdicts(sets)
+            tallies, list(input_notes(detected, reference)), find_verdicts=lambda: self._verdicts(sets)
         )
 
     def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:

@@ -22,8 +22,9 @@ from .base import Evaluation, Evaluator
 from .index import IndexGroup, index, ratio
 from .overlay.coverage import CountedSets, counted_sets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import LeftOut, left_out_notes, repair_notes
+from .overlay.left_out import LeftOut, left_out_notes
 from .overlay.pair_shapes import corner_counts
+from .overlay.reference_overlaps import input_notes
 from .tally import Tallies
 from .verdict_table import Measure, Verdicts
 
@@ -236,7 +237,7 @@ class SongHaithcoat(Evaluator):
             left_out=sets.left_out,
         )
         return self.summarise(
-            tallies, list(repair_notes(detected, reference)), find_verdicts=lambda: self._verdicts(sets)
+            tallies, list(input_notes(detected, reference)), find_verdicts=lambda: self._verdicts(sets)
         )
 
     def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:

@@ -11,16 +11,35 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from .left_out import Objects, in_words
-from .overlaps import Overlaps
+from ...scenes.geodata.footprints import Footprints
+from .left_out import Objects, in_words, repair_notes
+from .overlaps import Overlaps, overlaps_within
 
-__all__ = ["reference_overlap_notes"]
+__all__ = ["input_notes", "reference_overlap_notes", "reference_warnings"]
 
 #: Share of an outline from which on it counts as covered.
 _COVERED = 0.999
 
 #: Most pairs that are named.
 _NAMED = 5
+
+
+def input_notes(detected: Footprints, reference: Footprints, within: Overlaps | None = None) -> Iterator[str]:
+    """Yield what is wrong with the sets themselves: repaired and unusable features, and overlaps of the reference.
+
+    Parameters
+    ----------
+    detected, reference : Footprints
+    within : Overlaps, optional
+        Pairs of references that share area, where they are known already.
+    """
+    yield from repair_notes(detected, reference)
+    yield from reference_warnings(reference) if within is None else reference_overlap_notes(reference, within)
+
+
+def reference_warnings(reference: Footprints) -> tuple[str, ...]:
+    """Return which references of different buildings overlap, are duplicates, or lie inside each other, in words."""
+    return tuple(reference_overlap_notes(reference, overlaps_within(reference)))
 
 
 def reference_overlap_notes(reference: Objects, within: Overlaps) -> Iterator[str]:

@@ -19,9 +19,9 @@ from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..base import Evaluation, Evaluator
-from ..overlay.left_out import LeftOut, left_out_notes, repair_notes
+from ..overlay.left_out import LeftOut, left_out_notes
 from ..overlay.outline_distances import PairDistances, pair_distances
-from ..overlay.reference_overlaps import reference_overlap_notes
+from ..overlay.reference_overlaps import input_notes
 from ..verdict_table import Verdicts
 from .correspondence import MATCHINGS
 from .counting import count_buildings, count_objects, measure_areas, pair_sums
@@ -182,8 +182,7 @@ class ThresholdFree(Evaluator):
             evaluator=self,
             tallies=tallies,
             notes=(
-                *repair_notes(detected, reference),
-                *reference_overlap_notes(reference, graph.within[1]),
+                *input_notes(detected, reference, graph.within[1]),
                 *self.notes_of(tallies),
             ),
             find_verdicts=lambda: _verdicts(graph, outlines, detected, reference),

@@ -120,3 +120,16 @@ def test_a_folder_that_is_no_scene_is_refused(tmp_path):
     code, out, err = run("scenes", "check", tmp_path)
     assert (code, out) == (2, "")
     assert "there is no scene.toml in it" in err
+
+
+def test_references_that_overlap_are_warnings_and_no_problem(tmp_path):
+    house = small_scenes.scene().reference.polygons[0]
+    twice = rb.Footprints.of([house, house], crs=small_scenes.CRS)
+    rb.save_scene(small_scenes.scene(reference=twice), tmp_path / "twice")
+    code, _, err = run("scenes", "check", tmp_path / "twice")
+    assert (code, err.strip()) == (
+        0,
+        "Warning: 1 pair of references of different buildings, duplicates of each other: 0 and 1",
+    )
+    content = json.loads(run("scenes", "check", tmp_path / "twice", "-f", "json")[1])
+    assert (content["problems"], len(content["warnings"])) == ([], 1)

@@ -5,6 +5,7 @@ import pytest
 import shapely
 
 import roofbench as rb
+from roofbench.evaluators.registry import EVALUATORS
 
 HOUSE, COURT, NEXT = shapely.box(0, 0, 10, 10), shapely.box(2, 2, 6, 6), shapely.box(9, 0, 19, 10)
 
@@ -27,6 +28,16 @@ def notes(polygons, building=None):
 def test_each_kind_is_named(polygons, message):
     assert notes(polygons) == [message]
     assert notes(polygons, [5, 5]) == [], "parts of one building may overlap"
+
+
+@pytest.mark.parametrize("name", EVALUATORS.names())
+def test_every_evaluator_and_a_comparison_name_them(name):
+    reference = rb.Footprints.of([HOUSE, HOUSE, NEXT])
+    expected = ["duplicates of each other: 0 and 1", "0 and 2 (10 %)", "1 and 2 (10 %)"]
+    found = " ".join(rb.evaluate(reference, reference, evaluator=name).notes)
+    assert all(words in found for words in expected)
+    paired = rb.compare(reference, rb.Footprints.of([HOUSE]), reference, evaluator=name)
+    assert all(words in " ".join(paired.first.notes) for words in expected)
 
 
 def test_touching_references_are_as_they_should_be():
