@@ -93,7 +93,7 @@ class Suite:
         if not kept:
             names = [scene.name for scene in self.scenes]
             raise UnknownNameError(
-                f"no scene of {self.name!r} matches {pattern!r}{nearest_hint(pattern, names)}; it has {_some(names)}"
+                f"no scene matches {pattern!r}{nearest_hint(pattern, names)}; {self.name!r} has {_some(names)}"
             )
         return replace(self, scenes=kept)
 

@@ -30,7 +30,7 @@ def _baseline() -> None:
     pass
 
 
-@app.command("save", cls=Command)
+@app.command("save", cls=Command, short_help="Run a suite and save the scores.")
 @with_run_options
 def save(
     output: Annotated[

@@ -30,6 +30,7 @@ from .options import (
     TimeLimitOption,
     VerboseOption,
 )
+from .usage_errors import UsageError
 
 if TYPE_CHECKING:
     from ..benchmark.execution.runner import Execution
@@ -80,6 +81,15 @@ def option_names(message: str, options: dict[str, str]) -> str:
 
 class Command(typer.core.TyperCommand):
     """A command whose errors name its options, and whose help names arguments by metavar and not by type."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words of the command; errors of the parser carry its context."""
+        try:
+            return list(super().parse_args(ctx, args))
+        except UsageError as error:
+            if error.ctx is None:
+                error.ctx = ctx
+            raise
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return the words of the usage line."""

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from .evaluation_in_parts import InParts, compare_in_parts, is_large
-from .footprint_inputs import check_targets, print_problems, read_truth, short_name
+from .footprint_inputs import print_problems, read_truth, short_name
 from .options import (
     FORMAT_HELP,
     BuildingIdOption,
@@ -67,6 +67,7 @@ def compare(
     from ..evaluators.registry import ALL, DEFAULT, make_evaluator
     from ..evaluators.uncertainty.paired import compare as compared
     from ..reports.pair_text import format_pair
+    from ..reports.verdict_outputs import check_targets
     from ..scenes.geodata.vector_files import read_footprints
 
     if evaluator == ALL:

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["detectors", "evaluators", "everything", "indices", "plugins", "presets", "suites", "suites_and_scenes"]
+__all__ = [
+    "detectors",
+    "evaluators",
+    "everything",
+    "indices",
+    "plugins",
+    "presets",
+    "recipes",
+    "scenes",
+    "suites",
+    "suites_and_scenes",
+]
 
 
 def detectors(incomplete: str) -> list[str]:
@@ -27,11 +38,12 @@ def everything(incomplete: str) -> list[str]:
 
 
 def indices(incomplete: str) -> list[str]:
-    """Return the keys of indices of all evaluators that start with the typed text."""
-    from ..evaluators.registry import EVALUATORS, make_evaluator
+    """Return the keys and symbols of indices of all evaluators that start with the typed text."""
+    from ..evaluators.registry import EVALUATORS
 
-    keys = [index.key for name in EVALUATORS.names() for index in make_evaluator(name).indices]
-    return _starting(dict.fromkeys(keys), incomplete)
+    every = [index for name in EVALUATORS.names() for index in EVALUATORS.get(name).indices]
+    names = [*(index.key for index in every), *(index.symbol for index in every if index.symbol)]
+    return _starting(dict.fromkeys(names), incomplete)
 
 
 def plugins(incomplete: str) -> list[str]:
@@ -46,6 +58,23 @@ def presets(incomplete: str) -> list[str]:
     return _starting(preset_names(), incomplete)
 
 
+def recipes(incomplete: str) -> list[str]:
+    """Return the recipes of open data that start with the typed text."""
+    from ..scenes.fetching import open_data_names
+
+    return _starting(open_data_names(), incomplete)
+
+
+def scenes(incomplete: str) -> list[str]:
+    """Return the shipped scenes, presets and scene folders that start with the typed text."""
+    from pathlib import Path
+
+    from ..scenes.shipped import shipped_names
+
+    folders = sorted(file.parent.name for file in Path().glob("*/scene.toml"))
+    return [*presets(incomplete), *_starting([*shipped_names(), *folders], incomplete)]
+
+
 def suites(incomplete: str) -> list[str]:
     """Return the suites that start with the typed text."""
     from ..benchmark.suite import suite_names
@@ -54,13 +83,11 @@ def suites(incomplete: str) -> list[str]:
 
 
 def suites_and_scenes(incomplete: str) -> list[str]:
-    """Return the suites, scenes, presets and scene folders that start with the typed text."""
+    """Return the suites, suite files, scenes, presets and scene folders that start with the typed text."""
     from pathlib import Path
 
-    from ..scenes.shipped import shipped_names
-
-    folders = sorted(file.parent.name for file in Path().glob("*/scene.toml"))
-    return [*suites(incomplete), *presets(incomplete), *_starting([*shipped_names(), *folders], incomplete)]
+    files = _starting(sorted(str(file) for file in Path().glob("*.toml")), incomplete)
+    return [*suites(incomplete), *scenes(incomplete), *files]
 
 
 def _starting(names: Iterable[str], incomplete: str) -> list[str]:

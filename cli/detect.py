@@ -47,7 +47,7 @@ def detect(
         typer.Argument(
             metavar="SCENE",
             help="Scene folder, or preset such as 'knox-small[seed=3]'.",
-            autocompletion=completion.suites_and_scenes,
+            autocompletion=completion.scenes,
         ),
     ],
     output: Annotated[
@@ -92,9 +92,10 @@ def detect(
     from ..scenes.geodata.vector_files import output_driver, write_footprints
 
     load_plugins(plugin)
+    chosen = make_detector(detector, dict(parameter or ()))
+    (recipe,) = scenes_of([scene])
     if output is None and steps is None:
         raise ParameterError("name what to write: output= for footprints, steps= for pictures")
-    chosen = make_detector(detector, dict(parameter or ()))
     if tile is None:
         _refuse_without_tiles(halo, scheduler, jobs)
     if output is not None:
@@ -104,7 +105,6 @@ def detect(
         from ..reports.steps.step_folder import check_step_folder
 
         check_step_folder(steps, overwrite=overwrite)
-    (recipe,) = scenes_of([scene])
     if tile is not None:
         from ..benchmark.execution.city import City
         from .command import RunOptions

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from .evaluation_in_parts import InParts, evaluate_in_parts, is_large
-from .footprint_inputs import check_targets, print_problems, read_truth, short_name
+from .footprint_inputs import print_problems, read_truth, short_name
 from .options import (
     FORMAT_HELP,
     BuildingIdOption,
@@ -95,6 +95,7 @@ def evaluate(
     from ..core.errors import InputError, ParameterError, UnsupportedError
     from ..evaluators.registry import ALL, DEFAULT, all_evaluators, make_evaluator
     from ..reports.evaluation_text import format_evaluation, format_evaluations
+    from ..reports.verdict_outputs import check_targets
     from ..scenes.geodata.vector_files import read_footprints
 
     chosen: dict[str, Any] = {"matching": matching, "area": area, "gsd": gsd, "minimum_area": minimum_area}

@@ -1,8 +1,7 @@
-"""What ``evaluate`` and ``compare`` read and where they write: footprints, the reference with its area, and targets."""
+"""What ``evaluate`` and ``compare`` read: footprints, and the reference with its area."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
     from ..scenes.geodata.footprints import Footprints
     from ..scenes.geodata.raster import Grid
 
-__all__ = ["Truth", "check_targets", "print_problems", "read_truth", "short_name"]
+__all__ = ["Truth", "print_problems", "read_truth", "short_name"]
 
 
 class Truth(NamedTuple):
@@ -72,26 +71,6 @@ def print_problems(detected: Sequence[Footprints], truth: Truth, *, evaluation_a
             f"{evaluation_area} holds none of the footprints, neither detected nor reference: "
             "check that it shows the same place in the CRS that it names"
         )
-
-
-def check_targets(verdicts: Path | None, plot: Path | None, *, inputs: tuple[str | None, ...], overwrite: bool) -> None:
-    """Raise `OutputError` for any output that could not be written, before there is a first one."""
-    from ..core.errors import OutputError
-    from ..core.output import check_target
-    from ..scenes.geodata.vector_files import output_driver, split_layer
-
-    read = {os.path.realpath(split_layer(name)[0]) for name in inputs if name}
-    for target in (verdicts, plot):
-        if target is not None:
-            check_target(target, overwrite)
-            if os.path.realpath(target) in read:
-                raise OutputError(f"{target} is an input of this comparison: name another file")
-    if verdicts is not None:
-        output_driver(verdicts)
-    if plot is not None:
-        from ..reports.figures import check_picture
-
-        check_picture(plot)
 
 
 def short_name(path: str) -> str:

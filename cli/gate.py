@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import InputError, ParameterError, UnknownNameError
+from ..core.errors import InputError, ParameterError
+from . import completion
 from .command import RunOptions, with_run_options
 from .console import messages
 from .measuring import measure_suite
 from .options import DetectorOption, FormatOption, IndicesOption, OverwriteOption, ScenesOption, SuiteOption
 
 if TYPE_CHECKING:
-    from ..benchmark.analysis.baseline import Baseline
     from ..benchmark.analysis.self_test import SelfTest
     from ..benchmark.suite import DetectorEntry, Suite
 
@@ -36,7 +36,12 @@ def gate(
     detector: DetectorOption = None,
     against: Annotated[
         str | None,
-        typer.Option("--against", metavar="DETECTOR", help="Detector of the baseline to compare the one of -d with."),
+        typer.Option(
+            "--against",
+            metavar="DETECTOR",
+            help="Detector of the baseline to compare the one of -d with.",
+            autocompletion=completion.detectors,
+        ),
     ] = None,
     scenes: ScenesOption = None,
     index: IndicesOption = None,
@@ -124,7 +129,7 @@ def gate(
         after = after if scenes is None else after.with_scenes(scenes)
     else:
         if detector:
-            before, entries = _named(before, detector)
+            before, entries = before.named(detector)
         else:
             entries = before.to_suite().detectors
         chosen = replace(before.to_suite(), detectors=entries)
@@ -163,7 +168,6 @@ def _write(path: Path | None, overwrite: bool, text: str) -> None:
 def _self_test(suite: Suite, options: RunOptions, **how: Any) -> SelfTest:
     """Measure a suite twice with different seeds, the second time without stored results, and test the gate on it."""
     from ..benchmark.analysis.self_test import self_test
-    from ..benchmark.suite import DetectorEntry
 
     console = messages(options.quiet)
     first, _ = measure_suite(suite, options, console)
@@ -175,20 +179,3 @@ def _self_test(suite: Suite, options: RunOptions, **how: Any) -> SelfTest:
         apart = replace(options, store=Path(folder) / "self-test.sqlite")
         second, _ = measure_suite(replace(suite, detectors=fresh), apart, console)
     return self_test(first, second, **how)
-
-
-def _named(before: Baseline, selections: list[str]) -> tuple[Baseline, tuple[DetectorEntry, ...]]:
-    """Return what the baseline has of the detectors that are named, and those to be run, with its seeds."""
-    from ..benchmark.suite import DetectorEntry
-    from ..detectors.registry import make_detector
-
-    detectors = {entry.label: entry.detector for entry in (DetectorEntry(make_detector(name)) for name in selections)}
-    known = before.counterparts(list(detectors))
-    for label in detectors:
-        if label not in known:
-            raise UnknownNameError(
-                f"the baseline has no detector {label!r}; it has {', '.join(before.detectors)}: name the one "
-                "to compare it with by against="
-            )
-    entries = (DetectorEntry(detector, before.detectors[known[label]].seeds) for label, detector in detectors.items())
-    return before.only(known.values()), tuple(entries)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator, MutableMapping
+from contextlib import contextmanager
 from typing import Any
 
 import typer
 import typer.core
 import typer.main
 
+from ..core.errors import ParameterError
 from .command import Command
+from .usage_errors import UsageError, usage_sentence
 
 __all__ = ["COMMANDS", "LazyGroup"]
 
@@ -72,6 +75,27 @@ class LazyGroup(typer.core.TyperGroup):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.commands = _Commands()
+        self._words: list[str] = []
+
+    def make_context(self, info_name: Any, args: Any, parent: Any = None, **extra: Any) -> Any:
+        """Read the command line; a mistake ends in one sentence."""
+        self._words = list(args)
+        with self._mistakes_in_a_sentence():
+            return super().make_context(info_name, args, parent, **extra)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Call the command; a mistake in its words ends in one sentence."""
+        with self._mistakes_in_a_sentence():
+            return super().invoke(ctx)
+
+    @contextmanager
+    def _mistakes_in_a_sentence(self) -> Iterator[None]:
+        try:
+            yield
+        except UsageError as error:
+            if type(error).__name__ == "NoArgsIsHelpError":
+                raise
+            raise ParameterError(usage_sentence(error, self._words)) from None
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the commands in the order of the help."""

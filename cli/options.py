@@ -118,7 +118,12 @@ DetectorOption = Annotated[
 ]
 DetectorsOption = Annotated[
     str | None,
-    typer.Option("--detectors", metavar="PATTERN", help="Only detectors whose label matches, such as 'ndsm*'."),
+    typer.Option(
+        "--detectors",
+        metavar="PATTERN",
+        help="Only detectors whose label matches, such as 'ndsm*'.",
+        autocompletion=completion.detectors,
+    ),
 ]
 DetectorSeedsOption = Annotated[
     int,
@@ -215,7 +220,13 @@ RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="Number of the run, or the first digits of its key (see 'roofbench ls').")
 ]
 ScenesOption = Annotated[
-    str | None, typer.Option("--scenes", metavar="PATTERN", help="Only scenes whose name matches, such as 'knox*'.")
+    str | None,
+    typer.Option(
+        "--scenes",
+        metavar="PATTERN",
+        help="Only scenes whose name matches, such as 'knox*'.",
+        autocompletion=completion.scenes,
+    ),
 ]
 SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", metavar="URL", help="Dask scheduler, for instance tcp://host:8786.")

@@ -18,6 +18,6 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
 )
-app.command("sweep", cls=Command)(plot_sweep)
-app.command("scene", cls=Command)(plot_scene)
-app.command("gate", cls=Command)(plot_gate)
+app.command("sweep", cls=Command, short_help="Plot quality along swept parameters.")(plot_sweep)
+app.command("scene", cls=Command, short_help="Plot the verdicts of detectors on a scene.")(plot_scene)
+app.command("gate", cls=Command, short_help="Plot the paired differences of a gate.")(plot_gate)

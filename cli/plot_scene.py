@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from ..core.errors import ParameterError, UnknownNameError
+from . import completion
 from .command import load_plugins
 from .options import (
     DEFAULT_STORE,
@@ -46,7 +47,12 @@ def read_window(text: str) -> Window:
 
 def plot_scene(
     name: Annotated[
-        str, typer.Argument(metavar="SCENE", help="Scene as named in the store, or a pattern that matches one scene.")
+        str,
+        typer.Argument(
+            metavar="SCENE",
+            help="Scene as named in the store, or a pattern that matches one scene.",
+            autocompletion=completion.scenes,
+        ),
     ],
     output: PictureOption,
     detectors: DetectorsOption = None,

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..benchmark.analysis.results import Leaderboard
-    from ..benchmark.plan import KeyedEvaluator, Plan
+    from ..benchmark.plan import KeyedEvaluator
     from ..benchmark.store.records import RunRow
     from ..benchmark.store.writer import Store
 
@@ -84,7 +84,9 @@ def run(
     from ..benchmark.plan import make_plan, plan_content, suite_from_content
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
+    from ..core.output import make_folder_for
     from ..reports.leaderboard_text import print_unsuccessful, show_leaderboards, write_leaderboards
+    from ..reports.plan_text import format_plan
 
     execution = options.execution()
     if resume and words:
@@ -100,12 +102,12 @@ def run(
             suite = suite.with_scenes(scenes)
         suite.evaluators[0].ranking_index(index)
         if output is not None and not dry_run:
-            _make_folder(output, overwrite)
+            make_folder_for(("report.html", "leaderboard.csv", "leaderboard.md"), output, overwrite=overwrite)
         plan = make_plan(suite, opened, rerun=rerun, only_failed=retry_failed)
         for warning in plan.warnings:
             console.print(f"Warning: {warning}", markup=False)
         if dry_run:
-            _print_plan(plan)
+            typer.echo(format_plan(plan, form))
             return
         opened.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
         with run_progress(plan, console, verbose=options.verbose) as report:
@@ -142,28 +144,6 @@ def run(
             raise typer.Exit(4)
 
 
-def _print_plan(plan: Plan) -> None:
-    words = {"detect": "run", "evaluate": "evaluate", "nothing": "stored"}
-    skipped = 0
-    for run in plan.runs:
-        identity, word, why = run.identity, words[run.todo], run.why
-        if run.skip:
-            word, why = "skip", f"{why}; {run.skip}"
-            skipped += 1
-        elif run.stored is None and run.todo == "nothing":
-            word = "left out"
-        typer.echo(f"{word:9}{identity.label}  {identity.scene.name}  seed {identity.seed}: {why}")
-    counts, left_out = plan.counts(), len(plan.left_out)
-    parts = [
-        f"{counts['detect'] - skipped} to run",
-        f"{counts['evaluate']} to evaluate",
-        f"{counts['nothing'] - left_out} left as stored",
-        *([f"{skipped} to skip"] if skipped else []),
-        *([f"{left_out} left out"] if left_out else []),
-    ]
-    typer.echo(f"{len(plan.runs)} runs: {', '.join(parts)}")
-
-
 def _write_report(
     page: Path,
     store: Store,
@@ -182,17 +162,3 @@ def _write_report(
     filled = fill_report(store, rows, title=f"Suite {suite}", evaluated=evaluated)
     write_report(filled, page, overwrite=True)
     return [page]
-
-
-def _make_folder(folder: Path, overwrite: bool) -> None:
-    """Make the folder for results before the long work, or say why it cannot be."""
-    from ..core.errors import OutputError
-    from ..core.output import check_target
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = "it is a file" if folder.is_file() else error.strerror
-        raise OutputError(f"{folder} cannot be made: {reason}; set another folder by output=") from error
-    for name in ("report.html", "leaderboard.csv", "leaderboard.md"):
-        check_target(folder / name, overwrite)

@@ -22,10 +22,10 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
 )
-app.command("fetch", cls=Command)(fetch)
-app.command("import", cls=Command)(import_)
-app.command("index", cls=Command)(index)
-app.command("make", cls=Command)(make)
-app.command("list", cls=Command)(list_scenes)
-app.command("check", cls=Command)(check)
-app.command("show", cls=Command)(show)
+app.command("fetch", cls=Command, short_help="Download open data and print the import command.")(fetch)
+app.command("import", cls=Command, short_help="Make a scene of point files, images and footprints.")(import_)
+app.command("index", cls=Command, short_help="Make a folder of tiles a scene, without copies.")(index)
+app.command("make", cls=Command, short_help="Make a synthetic scene, or the scenes of a suite.")(make)
+app.command("list", cls=Command, short_help="List presets, or the generator's parameters.")(list_scenes)
+app.command("check", cls=Command, short_help="Check a scene folder and print its contents.")(check)
+app.command("show", cls=Command, short_help="Draw a scene as a picture.")(show)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from . import completion
 from .options import ParameterOption, QuietOption
 from .progress import import_progress
 
@@ -20,7 +21,12 @@ __all__ = ["fetch", "import_command"]
 
 def fetch(
     recipe: Annotated[
-        str | None, typer.Argument(metavar="RECIPE", help="Recipe by name, or a TOML file; without it, list them.")
+        str | None,
+        typer.Argument(
+            metavar="RECIPE",
+            help="Recipe by name, or a TOML file; without it, list them.",
+            autocompletion=completion.recipes,
+        ),
     ] = None,
     parameter: ParameterOption = None,
     extent: Annotated[

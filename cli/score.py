@@ -155,15 +155,10 @@ def _show(
 ) -> None:
     """Evaluate what lacks an evaluation, and print a leaderboard for each evaluator."""
     from ..benchmark.analysis.leaderboard import make_leaderboard, unsuccessful_runs
-    from ..benchmark.execution.runner import score_stored
+    from ..benchmark.execution.runner import score_missing
     from ..reports.leaderboard_text import print_unsuccessful, show_leaderboards
 
-    good = [row.id for row in rows if row.status == "ok"]
-    for keyed in evaluators:
-        known = store.evaluated(good, keyed.key)
-        for run_id in good:
-            if run_id not in known:
-                score_stored(store, run_id, (keyed,))
+    good = score_missing(store, rows, evaluators)
     boards = [
         make_leaderboard(rows, store, keyed, title=title, rank_by=show.index, all_versions=show.all_versions)
         for keyed in evaluators

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ..core.errors import OutputError, ParameterError
+from ..core.errors import ParameterError
 from . import completion
 from .command import RunOptions, with_run_options
 from .console import messages, table_console
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..benchmark.analysis.sweep import Sweep
     from ..evaluators.base import Index
 
-__all__ = ["sweep", "write_table"]
+__all__ = ["sweep"]
 
 
 @with_run_options
@@ -75,16 +75,13 @@ def sweep(
     from ..benchmark.analysis.sweep import axis_of, break_downs, make_sweep, run_sweep
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
-    from ..core.output import check_target
     from ..core.registry import split_list
     from ..reports.leaderboard_text import print_unsuccessful
-    from ..reports.sweep_text import break_down_text
+    from ..reports.sweep_text import break_down_text, check_sweep_table, write_sweep_table
 
     execution = options.execution()
     if output is not None:
-        if output.suffix.lower() not in (".csv", ".parquet"):
-            raise OutputError(f"{output}: unknown file ending {output.suffix!r}: name it .csv or .parquet")
-        check_target(output, overwrite)
+        check_sweep_table(output, overwrite)
     suite = suite_of_words(words, split_list(detectors), evaluator, seeds=detector_seeds)
     if seeds is not None:
         suite = suite.with_seeds(seeds)
@@ -100,7 +97,7 @@ def sweep(
             table, rows = run_sweep(planned, opened, execution=execution, progress=report)
     # The file first: the reader of the table may close the pipe (head).
     if output is not None:
-        write_table(table, output, overwrite=overwrite)
+        write_sweep_table(table, output, overwrite=overwrite)
         console.print(f"{output}: {len(table)} rows", markup=False)
     _print(table, planned, shown, form)
     if level is not None:
@@ -113,20 +110,6 @@ def sweep(
         raise typer.Exit(3)
     if not table["scenes"].any():
         raise typer.Exit(4)
-
-
-def write_table(table: pd.DataFrame, path: Path, *, overwrite: bool) -> None:
-    """Write a tidy table as CSV or Parquet, whole or not at all."""
-    from ..core.output import whole_file
-
-    with whole_file(path, overwrite=overwrite) as scratch:
-        if path.suffix.lower() == ".csv":
-            table.to_csv(scratch, index=False)
-            return
-        try:
-            table.to_parquet(scratch, index=False)
-        except ImportError as error:
-            raise OutputError(f"{path}: Parquet needs pyarrow: pip install 'roofbench[parquet]'") from error
 
 
 def _print(table: pd.DataFrame, planned: Sweep, index: Index, form: Literal["table", "csv", "md", "json"]) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from .errors import OutputError
 
-__all__ = ["check_folder", "check_target", "whole_file", "whole_folder"]
+__all__ = ["check_folder", "check_target", "make_folder_for", "whole_file", "whole_folder"]
 
 #: Errors of a file system that has no room: they name no file.
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -57,6 +57,17 @@ def check_folder(path: Path, overwrite: bool, *, holds: Sequence[str]) -> None:
         raise OutputError(
             f"{path} holds {other[0]}{more}, which replacing it would delete: name another folder, or move that away"
         )
+
+
+def make_folder_for(names: Sequence[str], folder: Path, *, overwrite: bool) -> None:
+    """Make a folder for files of these names before the long work, or raise `OutputError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = "it is a file" if folder.is_file() else error.strerror
+        raise OutputError(f"{folder} cannot be made: {reason}; set another folder by output=") from error
+    for name in names:
+        check_target(folder / name, overwrite)
 
 
 @contextmanager

@@ -32,6 +32,9 @@ from .registry import nearest_hint
 
 __all__ = ["Parameter", "Parameterised", "execution_option", "parameter", "parameter_text"]
 
+#: Names of parameters that a message lists at most.
+_MOST_NAMES = 24
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Parameter:
@@ -296,8 +299,10 @@ class Parameterised(Displayed):
         checked = {}
         for name, value in (values or {}).items():
             if name not in known:
+                listed = ", ".join([*known][:_MOST_NAMES]) or "none"
+                more = f" and {len(known) - _MOST_NAMES} more" if len(known) > _MOST_NAMES else ""
                 raise ParameterError(
-                    f"{owner}: no parameter {name!r}{nearest_hint(name, known)}; it has {', '.join(known) or 'none'}"
+                    f"{owner}: no parameter {name!r}{nearest_hint(name, known)}; it has {listed}{more}"
                 )
             rule = known[name]
             as_text = isinstance(value, str) and rule.type is not str

@@ -251,7 +251,7 @@ class Evaluator(Parameterised, ABC):
         if found is None:
             raise UnknownNameError(
                 f"the evaluator {cls.name!r} has no index {name!r}{nearest_hint(name, [*by_key, *by_symbol])}; "
-                f"it has {', '.join(by_key)}"
+                f"it has {', '.join(list(by_key)[:3])} and others: 'roofbench list indices' shows all"
             )
         return found
 

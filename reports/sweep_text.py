@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..benchmark.analysis.break_down import BreakDown
+from ..core.errors import OutputError
+from ..core.output import check_target, whole_file
 from ..core.parameters import parameter_text
 from ..evaluators.base import Index
 from .format import column_title, index_name, interval_text, number_text, value_text
@@ -14,7 +17,26 @@ from .tables import Column, Table
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["break_down_text", "sweep_records", "sweep_table"]
+__all__ = ["break_down_text", "check_sweep_table", "sweep_records", "sweep_table", "write_sweep_table"]
+
+
+def check_sweep_table(path: Path, overwrite: bool) -> None:
+    """Raise `OutputError` when a table cannot be written to a file of that name; call it before long work."""
+    if path.suffix.lower() not in (".csv", ".parquet"):
+        raise OutputError(f"{path}: unknown file ending {path.suffix!r}: name it .csv or .parquet")
+    check_target(path, overwrite)
+
+
+def write_sweep_table(table: pd.DataFrame, path: Path, *, overwrite: bool) -> None:
+    """Write a tidy table as CSV or Parquet, whole or not at all."""
+    with whole_file(path, overwrite=overwrite) as scratch:
+        if path.suffix.lower() == ".csv":
+            table.to_csv(scratch, index=False)
+            return
+        try:
+            table.to_parquet(scratch, index=False)
+        except ImportError as error:
+            raise OutputError(f"{path}: Parquet needs pyarrow: pip install 'roofbench[parquet]'") from error
 
 
 def break_down_text(found: BreakDown) -> str:

@@ -18,6 +18,7 @@ from ...core.errors import InputError, ParameterError, UnknownNameError
 from ...core.output import whole_file
 from ...core.package import BENCHMARK_VERSION
 from ...core.registry import nearest_hint
+from ...detectors.registry import make_detector
 from ...evaluators.base import Evaluator
 from ..identity.detector_code import DetectorCode
 from ..identity.provenance import CodeVersion
@@ -116,6 +117,25 @@ class Baseline:
         if len(set(found.values())) < len(found):
             raise ParameterError(f"{', '.join(found)}: each detector of a baseline can be compared with one only")
         return found
+
+    def named(self, selections: Sequence[str]) -> tuple[Baseline, tuple[DetectorEntry, ...]]:
+        """Return what the baseline has of the detectors that are selected, and these with its seeds, to be run.
+
+        Raises
+        ------
+        UnknownNameError
+            One of them has no counterpart in the baseline.
+        """
+        chosen = {entry.label: entry.detector for entry in map(DetectorEntry, map(make_detector, selections))}
+        known = self.counterparts(list(chosen))
+        for label in chosen:
+            if label not in known:
+                raise UnknownNameError(
+                    f"the baseline has no detector {label!r}{nearest_hint(label, self.detectors)}; it has "
+                    f"{', '.join(self.detectors)}: name the one to compare it with by against="
+                )
+        entries = (DetectorEntry(one, self.detectors[known[label]].seeds) for label, one in chosen.items())
+        return self.only(known.values()), tuple(entries)
 
     def with_labels_of(self, other: Baseline) -> Baseline:
         """Return the baseline with detectors named as their counterparts in `other`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -24,7 +24,7 @@ from .isolation import call_isolated
 from .tasks import Task
 from .worker import execute, score
 
-__all__ = ["Execution", "RunResult", "run_plan", "score_stored"]
+__all__ = ["Execution", "RunResult", "run_plan", "score_missing", "score_stored"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,6 +115,17 @@ def run_plan(
     stored = store.runs_of(plan.keys)
     rows = tuple(stored[key] for key in plan.keys if key in stored)
     return RunResult(rows=rows, done=done, evaluated=evaluated)
+
+
+def score_missing(store: Store, rows: Sequence[RunRow], evaluators: Sequence[KeyedEvaluator]) -> list[int]:
+    """Evaluate the good runs among these that lack an evaluation; return the numbers of the good runs."""
+    good = [row.id for row in rows if row.status == "ok"]
+    for keyed in evaluators:
+        known = store.evaluated(good, keyed.key)
+        for run_id in good:
+            if run_id not in known:
+                score_stored(store, run_id, (keyed,))
+    return good
 
 
 def score_stored(store: Store, run_id: int, evaluators: tuple[KeyedEvaluator, ...]) -> int:

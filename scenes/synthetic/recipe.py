@@ -13,6 +13,7 @@ Units are metres and degrees; shares lie between 0 and 1; densities are per hect
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ...core.errors import ParameterError
 from ...core.parameters import Parameterised, parameter
@@ -34,6 +35,8 @@ class SceneParameters(Parameterised):
     ParameterError
         For a value outside its range, or values that contradict each other; the message names both.
     """
+
+    name: ClassVar[str] = "scene generator"
 
     width: float = parameter(250.0, unit="m", minimum=40, maximum=2000, doc="extent from west to east")
     height: float = parameter(250.0, unit="m", minimum=40, maximum=2000, doc="extent from south to north")

@@ -139,4 +139,4 @@ def test_help_imports_no_command():
 def test_a_mistyped_command_is_answered_with_the_nearest():
     code, _, err = run("evalute")
     assert code == 2
-    assert "Did you mean 'evaluate'?" in err
+    assert "(did you mean 'evaluate'?)" in err
