@@ -69,7 +69,7 @@ def _say(result: CityResult, output: Path, name: str) -> None:
     if any(seams):
         typer.echo(
             f"note: {name}: at the seams {seams.doubles} double and {seams.cut} cut footprints were left out, "
-            f"{seams.joined} cut ones joined",
+            f"{seams.joined} cut ones joined, {seams.added} added that only the neighbouring tile found",
             err=True,
         )
     if result.skipped:

@@ -9,11 +9,13 @@ halo
     Metres around the core that a detector sees besides it (`Detector.halo`).
 owner
     The tile whose core holds the centre of a footprint; only the owner keeps it.
+spare
+    A footprint that a tile found a little beyond its core. Its owner may see another building there, centred elsewhere.
 cut
     A footprint that reaches the rim of a tile's halo inside the scene: the tile may not see all of it.
 seam pass
     What follows the last tile: of footprints that two tiles found (IoU above 0.5) one stays; a cut one is replaced by
-    the whole one, or joined with the cut parts of other tiles.
+    the whole one, or joined with the cut parts of other tiles; a spare one is added where nothing else stands.
 
 A tile depends on the scene and on its column and row, never on another tile, so that the result is independent of the
 order of the tiles and of the number of workers.
@@ -40,10 +42,12 @@ from ..scenes.ground.lowest_points import default_cell
 from ..scenes.scene import Scene
 from .base import Detector
 
-__all__ = ["CUT", "Measured", "Seams", "Tile", "join_tiles", "measure", "owned", "stream_of", "tiles_over"]
+__all__ = ["CUT", "SPARE", "Measured", "Seams", "Tile", "join_tiles", "measure", "owned", "stream_of", "tiles_over"]
 
-#: Attribute of the footprints of a tile that says which are cut; `join_tiles` removes it.
-CUT = "cut_by_tile"
+#: Attributes of the footprints of a tile that say which are cut and which are spare; `join_tiles` removes them.
+CUT, SPARE = "cut_by_tile", "spare_of_tile"
+#: Metres around a core in which footprints are spare, and the share of one that others may cover where it is added.
+_NEAR, _FREE = 30.0, 0.25
 #: Footprints of different tiles with more than this IoU are one; a cut one is replaced where another covers so much of
 #: it.
 _SAME, _COVERED = 0.5, 0.5
@@ -124,11 +128,14 @@ class Seams(NamedTuple):
         Left out because another tile sees the whole of it.
     joined : int
         Cut parts that were joined into fewer.
+    added : int
+        Spare ones that were added.
     """
 
     doubles: int
     cut: int
     joined: int
+    added: int
 
 
 def tiles_over(extent: _Extent, side: float) -> list[Tile]:
@@ -203,7 +210,7 @@ def _middle(scene: Scene, tile: Tile) -> Scene | None:
 
 
 def owned(found: Footprints, tile: Tile, part: _Extent, whole: _Extent) -> Footprints:
-    """Return the footprints that a tile owns, with the attribute `CUT`.
+    """Return the footprints that a tile owns and those that are spare, with the attributes `CUT` and `SPARE`.
 
     Parameters
     ----------
@@ -213,13 +220,17 @@ def owned(found: Footprints, tile: Tile, part: _Extent, whole: _Extent) -> Footp
     part, whole : tuple of float
         Extents of the window, halo included, and of the scene.
     """
-    found = found.take(tile.owns(found.centres, whole)) if len(found) else found
+    own = tile.owns(found.centres, whole) if len(found) else np.zeros(0, dtype=np.bool_)
+    kept = own | (tile.depth(found.centres) >= -_NEAR) if len(found) else own
+    found, spare = found.take(kept), ~own[kept]
     bounds = shapely.bounds(found.polygons).reshape(-1, 4)
     cut = np.zeros(len(found), dtype=np.bool_)
     for side, sign in enumerate((1, 1, -1, -1)):
         if part[side] != whole[side]:
             cut |= sign * (bounds[:, side] - part[side]) <= _RIM
-    return dataclasses.replace(found, attributes={**found.attributes, CUT: cut})
+    # What a tile sees in part and does not own is seen whole by others.
+    found, spare, cut = found.take(~(spare & cut)), spare[~(spare & cut)], cut[~(spare & cut)]
+    return dataclasses.replace(found, attributes={**found.attributes, CUT: cut, SPARE: spare})
 
 
 def join_tiles(
@@ -238,13 +249,18 @@ def join_tiles(
     """
     tiles = [tile for tile in sorted(parts) if len(parts[tile])]
     if not tiles:
-        return Footprints.empty(crs=crs, source=source), Seams(0, 0, 0)
+        return Footprints.empty(crs=crs, source=source), Seams(0, 0, 0, 0)
     whole = _concatenated([parts[tile] for tile in tiles], numbers, crs, source)
     tile_of = np.repeat(np.arange(len(tiles)), [len(parts[tile]) for tile in tiles])
     depth = np.concatenate([tile.depth(parts[tile].centres) for tile in tiles])
     columns = dict(whole.attributes)
-    cut = columns.pop(CUT).astype(np.bool_)
-    kept, joined = _seam_pass(whole.polygons, tile_of, depth, cut)
+    cut, spare = columns.pop(CUT).astype(np.bool_), columns.pop(SPARE).astype(np.bool_)
+    owned_rows = np.flatnonzero(~spare)
+    kept = np.zeros(len(whole), dtype=np.bool_)
+    kept[owned_rows], groups = _seam_pass(
+        whole.polygons[owned_rows], tile_of[owned_rows], depth[owned_rows], cut[owned_rows]
+    )
+    joined = {int(owned_rows[first]): owned_rows[group].tolist() for first, group in groups.items()}
     polygons = whole.polygons.copy()
     for first, group in joined.items():
         polygons[first] = shapely.union_all(polygons[group])
@@ -252,9 +268,14 @@ def join_tiles(
     lost = np.concatenate([np.asarray(group) for group in joined.values()]) if joined else np.empty(0, dtype=np.intp)
     in_groups = np.zeros(len(whole), dtype=np.bool_)
     in_groups[lost] = True
+    added = _added(polygons, kept, np.flatnonzero(spare), depth)
     seams = Seams(
-        doubles=int((~kept & ~cut).sum()), cut=int((~kept & cut & ~in_groups).sum()), joined=int(in_groups.sum())
+        doubles=int((~kept & ~cut & ~spare).sum()),
+        cut=int((~kept & cut & ~in_groups).sum()),
+        joined=int(in_groups.sum()),
+        added=len(added),
     )
+    kept[added] = True
     result = dataclasses.replace(whole, polygons=polygons, attributes=columns).take(kept)
     return dataclasses.replace(result, ids=np.arange(len(result), dtype=np.int64)), seams
 
@@ -292,6 +313,27 @@ def _seam_pass(
             rows = np.flatnonzero(label == number)
             groups[int(rows[np.argmax(area[rows])])] = rows.tolist()
     return kept, groups
+
+
+def _added(
+    polygons: NDArray[np.object_], kept: NDArray[np.bool_], spare: NDArray[np.intp], depth: NDArray[np.float64]
+) -> list[int]:
+    """Return the spare footprints of which kept ones and added ones cover little, the nearest to its tile first.
+
+    The owner of a place can have merged a house with its neighbours into a footprint that is centred in another tile,
+    where they are found one by one.
+    """
+    standing = np.flatnonzero(kept)
+    first, second = shapely.STRtree(polygons[standing]).query(polygons[spare], predicate="intersects")
+    common = shapely.area(shapely.intersection(polygons[spare[first]], polygons[standing[second]]))
+    covered = np.bincount(first, weights=common, minlength=len(spare))
+    free = spare[covered <= _FREE * shapely.area(polygons[spare])]
+    added: list[int] = []
+    for row in free[np.lexsort((free, -depth[free]))].tolist():
+        overlap = shapely.area(shapely.intersection(polygons[row], polygons[added])).sum() if added else 0.0
+        if overlap <= _FREE * polygons[row].area:
+            added.append(row)
+    return added
 
 
 def _concatenated(parts: Sequence[Footprints], numbers: Sequence[str], crs: str | None, source: str) -> Footprints:

@@ -52,3 +52,30 @@ def same_footprints(one, two, *, least=1e-6):
     found = np.full(len(one), np.inf)
     np.minimum.at(found, first, apart / one.areas[first])
     return found < least
+
+
+#: With tiles of 64 m: a hall of 300 m over six of them, a row of houses wall to wall over four, a house on a seam.
+STREET = {
+    "hall": (1020.0, 2050.0, 1320.0, 2085.0),
+    **{f"house {n}": (1040.0 + 12 * n, 2018.0, 1052.0 + 12 * n, 2028.0 + n % 2) for n in range(16)},
+    "on a seam": (1275.0, 2014.0, 1289.0, 2024.0),
+}
+
+
+def street(*, spacing=0.5, without=()):
+    """A scene of 400 x 96 m with the buildings of `STREET`; houses of the row have steps of 1.5 m between them."""
+    rng = np.random.default_rng(5)
+    rows, columns = round(96 / spacing), round(400 / spacing)
+    row, column = np.mgrid[0:rows, 0:columns].reshape(2, -1)
+    x = WEST + (column + rng.uniform(0.3, 0.7, row.size)) * spacing
+    y = SOUTH + (row + rng.uniform(0.3, 0.7, row.size)) * spacing
+    z = 10 + rng.normal(0, 0.02, row.size)
+    for number, (name, (west, south, east, north)) in enumerate(STREET.items()):
+        if name in without:
+            continue
+        z[(x > west) & (x < east) & (y > south) & (y < north)] += 6 + 1.5 * (number % 2)
+    extent = (WEST, SOUTH, WEST + 400, SOUTH + 96)
+    grid = rb.Grid.covering(extent, 2.0)
+    points = rb.PointCloud(x=np.round(x, 3), y=np.round(y, 3), z=np.round(z, 3))
+    dem = rb.Elevation(np.full(grid.shape, 10.0, np.float32), grid)
+    return rb.Scene("street", extent, crs="EPSG:25832", points=points, dem=dem)

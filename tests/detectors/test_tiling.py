@@ -9,16 +9,17 @@ from hypothesis import strategies as st
 from roofbench.detectors.mpp.mpp_detector import MPP
 from roofbench.detectors.ndsm.ndsm_detector import NDSM
 from roofbench.detectors.registry import DETECTORS
-from roofbench.detectors.tiling import CUT, Tile, join_tiles, owned, stream_of, tiles_over
+from roofbench.detectors.tiling import CUT, SPARE, Tile, join_tiles, owned, stream_of, tiles_over
 from roofbench.scenes.geodata.footprints import Footprints
 
 WHOLE = (0.0, 0.0, 300.0, 100.0)
 LEFT, MIDDLE, RIGHT = tiles_over(WHOLE, 100.0)
 
 
-def part(*boxes, cut=False, **columns):
+def part(*boxes, cut=False, spare=False, **columns):
     polygons = [shapely.box(*box) for box in boxes]
-    attributes = {CUT: np.full(len(boxes), cut), **{name: np.array(values) for name, values in columns.items()}}
+    attributes = {CUT: np.full(len(boxes), cut), SPARE: np.full(len(boxes), spare)}
+    attributes |= {name: np.array(values) for name, values in columns.items()}
     return Footprints.of(polygons, attributes=attributes)
 
 
@@ -67,7 +68,7 @@ def test_what_two_tiles_found_stays_once_where_it_lies_deeper():
     parts = {LEFT: part((90, 10, 109, 20)), MIDDLE: part((91, 10, 112, 20), (150, 10, 160, 20))}
     boxes, seams = joined(parts)
     assert boxes == [(91, 10, 112, 20), (150, 10, 160, 20)]
-    assert tuple(seams) == (1, 0, 0)
+    assert tuple(seams) == (1, 0, 0, 0)
 
 
 def test_overlaps_within_a_tile_stay():
@@ -80,7 +81,7 @@ def test_a_cut_footprint_gives_way_to_the_whole_of_it():
     parts = {LEFT: part((60, 10, 120, 20), cut=True), MIDDLE: part((60, 10, 200, 20))}
     boxes, seams = joined(parts)
     assert boxes == [(60, 10, 200, 20)]
-    assert tuple(seams) == (0, 1, 0)
+    assert tuple(seams) == (0, 1, 0, 0)
 
 
 def test_cut_parts_of_which_no_tile_sees_the_whole_are_joined():
@@ -91,7 +92,30 @@ def test_cut_parts_of_which_no_tile_sees_the_whole_are_joined():
     }
     boxes, seams = joined(parts)
     assert boxes == [(10, 10, 290, 20)]
-    assert tuple(seams) == (0, 0, 3)
+    assert tuple(seams) == (0, 0, 3, 0)
+
+
+def test_a_house_that_its_owner_lost_in_a_neighbour_is_added_from_the_tile_that_found_it():
+    """The middle tile sees one block of two houses, centred in the left one; the left tile sees both."""
+    found = part((80, 10, 99, 20), (101, 10, 114, 20))
+    left = owned(Footprints(polygons=found.polygons), LEFT, (0.0, 0.0, 164.0, 100.0), WHOLE)
+    assert left.attributes[SPARE].tolist() == [False, True]
+    block = Footprints.of([shapely.box(80, 10, 114, 20)])
+    middle = owned(block, MIDDLE, (36.0, 0.0, 264.0, 100.0), WHOLE)
+    assert middle.attributes[SPARE].tolist() == [True]
+    boxes, seams = joined({LEFT: left, MIDDLE: middle})
+    assert boxes == [(80, 10, 99, 20), (101, 10, 114, 20)]
+    assert tuple(seams) == (0, 0, 0, 1)
+
+
+def test_a_spare_footprint_is_not_added_where_its_owner_has_one():
+    left, middle = part((101, 10, 114, 20), spare=True), part((101, 10, 115, 20), (130, 10, 140, 20))
+    assert joined({LEFT: left, MIDDLE: middle})[0] == [(101, 10, 115, 20), (130, 10, 140, 20)]
+
+
+def test_a_spare_footprint_that_the_rim_cuts_is_left_out():
+    found = Footprints.of([shapely.box(101, 10, 120, 20)])
+    assert len(owned(found, LEFT, (0.0, 0.0, 120.0, 100.0), WHOLE)) == 0
 
 
 def test_the_order_of_the_parts_does_not_matter():

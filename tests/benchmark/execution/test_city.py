@@ -8,9 +8,10 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 import shapely
-from builders.town import HOUSES, SIDE, SOUTH, WEST, same_footprints, town, town_folder
+from builders.town import HOUSES, SIDE, SOUTH, STREET, WEST, same_footprints, street, town, town_folder
 from harness.command_line import run
 
 import roofbench as rb
@@ -62,6 +63,36 @@ def test_a_hall_that_no_tile_sees_whole_is_joined(folder, tmp_path):
     assert result.seams.joined > 1
     assert match.intersection(hall).area / match.union(hall).area > 0.9
     assert len(found) == len(HOUSES)
+
+
+def test_a_hall_of_300_m_a_row_over_four_tiles_and_a_house_on_a_seam_are_those_of_the_whole(tmp_path):
+    """Tiles of 64 m with a halo of 64 m: none sees the hall whole."""
+    save_scene(street(), tmp_path / "street")
+    detector = make_detector("ndsm[cell=0.5]")
+    result = detect(tmp_path / "street", tmp_path / "city.gpkg", detector=detector)
+    found, whole = rb.read_footprints(tmp_path / "city.gpkg"), rb.detect(rb.open_scene(tmp_path / "street"), detector)
+    assert result.seams.joined > 1
+    assert len(found) == len(whole) == 3
+    same = same_footprints(whole, found, least=0.01)
+    assert same.all()
+    hall = shapely.box(*STREET["hall"])
+    (match,) = [polygon for polygon in found.polygons if polygon.intersects(hall)]
+    assert match.intersection(hall).area / match.union(hall).area > 0.98
+
+
+@pytest.mark.slow
+def test_houses_of_a_row_over_four_tiles_stay_single(tmp_path):
+    save_scene(street(without=["hall"]), tmp_path / "street")
+    recipe, detector = SceneRecipe.of_folder(tmp_path / "street"), make_detector("mpp[level=part,largest_side=60]")
+    result = detect_city(recipe, detector, tmp_path / "city.gpkg", City(tile=64.0), execution=HERE)
+    found = rb.read_footprints(tmp_path / "city.gpkg")
+    assert result.tiles == 14
+    truth = np.array([shapely.box(*box) for name, box in STREET.items() if name != "hall"])
+    first, second = shapely.STRtree(found.polygons).query(truth, predicate="intersects")
+    common = shapely.area(shapely.intersection(truth[first], found.polygons[second]))
+    together = shapely.area(shapely.union(truth[first], found.polygons[second]))
+    assert len(found) == len(truth) == 17
+    assert np.bincount(first[common > 0.85 * together], minlength=17).tolist() == [1] * 17
 
 
 def test_neither_workers_nor_order_change_a_bit(folder, tmp_path):
