@@ -32,8 +32,9 @@ from .rectangles import corners
 
 __all__ = ["CERTAIN", "PROBABLE", "Wall", "WallRule", "most_walls", "party_walls", "wall_strength"]
 
-#: Metres: spacing of the lattice, narrowest house, smallest depth of a row, widest house of a row (median).
-_LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 4.5, 12.0
+#: Metres: spacing of the lattice, narrowest house, smallest depth of a rectangle with walls (the front or the rear half
+#: of a row often has one of its own), widest house of a row (median).
+_LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 3.5, 12.0
 #: Stations that a mean reaches on either side, and that lie between a valley and its shoulders.
 _REACH, _SHOULDER = 2, 2
 #: Metres: height differences that are noise, for steps and for valleys.
@@ -60,7 +61,7 @@ class WallRule(NamedTuple):
 
 
 CERTAIN = WallRule(0.75, 0.25, 0.75, 0.4)
-PROBABLE = WallRule(0.55, 0.1, 0.5, 0.15)
+PROBABLE = WallRule(0.5, 0.1, 0.5, 0.15)
 
 
 class Wall(NamedTuple):

@@ -125,10 +125,8 @@ def find_levels(
             buildings.append(blocks[number])
             block_of_building.append(number)
             continue
-        walls = {
-            k: party_walls(rectangles[k], height, state, grid, PROBABLE) if certain[k] else [] for k in members.tolist()
-        }
-        pieces, owners = _pieces(rectangles[members], blocks[number], [walls[k] for k in members.tolist()], grid)
+        walls = [party_walls(rectangle, height, state, grid, PROBABLE) for rectangle in rectangles[members]]
+        pieces, owners = _pieces(rectangles[members], blocks[number], walls, grid)
         group = _houses(pieces, owners)
         parts += pieces
         rectangle_of += members[owners].tolist()
