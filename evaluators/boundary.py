@@ -187,7 +187,7 @@ class ComplexityIndices(IndexGroup):
         symbol="S_IoU",
         meaning="mean over pairs of IoU times a factor that falls with the corners of the detection; below 1 for "
         "more than three corners",
-        source="evaluation.md, S-IoU",
+        source="formula in docs/reference/evaluators.md",
     )
 
 

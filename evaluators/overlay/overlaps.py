@@ -27,7 +27,7 @@ __all__ = [
     "shared_areas",
 ]
 
-#: Share of the smaller area up to which an intersection is rounding (evaluation.md, section 1).
+#: Share of the smaller area up to which an intersection is rounding (docs/reference/evaluation.md).
 NUMERICAL_ZERO = 1e-6
 
 _CHUNK = 1 << 18

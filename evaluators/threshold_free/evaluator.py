@@ -135,7 +135,10 @@ class ThresholdFree(Evaluator):
     measures = MEASURES
 
     matching: Literal["nearest", "one-pass", "overlap"] = parameter(
-        "nearest", choices=MATCHINGS, doc="how partners are chosen", source="2010 paper, 4.1; evaluation.md, 2"
+        "nearest",
+        choices=MATCHINGS,
+        doc="how partners are chosen",
+        source="2010 paper, 4.1; docs/reference/evaluation.md",
     )
     area: Literal["auto", "exact", "pixels"] = parameter(
         "auto",
