@@ -27,9 +27,10 @@ from numpy.typing import NDArray
 from ...core.kernels import kernel
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation, Grid
+from .doubt import doubtful_ground
 from .lowest_points import default_cell, lowest_surface, mean_above
 
-__all__ = ["elevation_from_points", "fill_unknown", "ground_surface"]
+__all__ = ["elevation_from_points", "fill_unknown", "filtered_ground", "ground_surface"]
 
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
@@ -84,11 +85,31 @@ def ground_surface(
     Elevation
         Known everywhere, unless there is no point at all (then NaN).
     """
+    rules = (largest_object, slope, wall_height)
+    return filtered_ground(points, extent, cell=cell, rules=rules, tolerance=tolerance)[0]
+
+
+def filtered_ground(
+    points: PointCloud,
+    extent: Sequence[float],
+    *,
+    cell: float | None = None,
+    rules: tuple[float, float, float] = (130.0, 0.15, 1.0),
+    tolerance: float = 0.4,
+) -> tuple[Elevation, _Mask]:
+    """Return what `ground_surface` does, and where it is unsure (`doubt`), shape (rows, columns).
+
+    Parameters
+    ----------
+    rules : tuple of float
+        Largest object, slope and wall height, see `ground_surface`.
+    """
+    largest_object, slope, wall_height = rules
     x, y, z = _finite(points)
     grid = Grid.covering(extent, cell or default_cell(x, y, extent))
     lowest = lowest_surface(x, y, z, grid)
     if np.isnan(lowest).all():
-        return Elevation(lowest, grid)
+        return Elevation(lowest, grid), np.ones(lowest.shape, dtype=bool)
     trend = _trend(lowest, grid.gsd, largest_object)
     relief = lowest - trend
     objects = _objects(relief, grid.gsd, largest_object, slope, wall_height)
@@ -106,7 +127,13 @@ def ground_surface(
             break
         objects &= ~again
         ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
-    return _averaged(x, y, z, grid, ground + trend, tolerance)
+    surface = Elevation(ground + trend, grid)
+    # The lowest point is biased by the noise: the mean of the points near the ground is not.
+    near = mean_above(x, y, z, surface, tolerance=tolerance)
+    seen = np.isfinite(near)
+    if seen.any():
+        surface = Elevation(surface.values + np.nan_to_num(fill_unknown(near)), grid)
+    return surface, doubtful_ground(surface, seen, np.isfinite(lowest))
 
 
 def elevation_from_points(
@@ -375,19 +402,3 @@ def _standing(removed: _Mask, walls: _Mask, beyond: _Mask) -> _Mask:
     walled = np.bincount(labels[border & walls], minlength=count)
     stands = walled >= _WALLED * np.maximum(length, 1)
     return np.asarray(removed & stands[labels])
-
-
-def _averaged(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    z: NDArray[np.float64],
-    grid: Grid,
-    ground: _Floats,
-    tolerance: float,
-) -> Elevation:
-    """Replace the lowest by the mean of the points within the tolerance of the ground: it is biased by the noise."""
-    surface = Elevation(ground, grid)
-    known = mean_above(x, y, z, surface, tolerance=tolerance)
-    if np.isnan(known).all():
-        return surface
-    return Elevation(ground + np.nan_to_num(fill_unknown(known)), grid)

@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation, Grid
-from .filter import fill_unknown, ground_surface
+from .doubt import doubt_note
+from .filter import fill_unknown, filtered_ground
 
 __all__ = ["HIGHEST_LAND", "LOWEST_LAND", "SEAM", "Heights", "heights_of"]
 
@@ -51,10 +52,13 @@ class Heights:
         Known everywhere in the extent; sampling clamps beyond it.
     notes : tuple of str
         One sentence for each thing that was estimated because the DEM does not show it.
+    doubtful : Elevation, optional
+        1 where the filtered ground is unsure (`doubt`), else 0; None where no ground was filtered.
     """
 
     ground: Elevation
     notes: tuple[str, ...] = ()
+    doubtful: Elevation | None = None
 
     def above(self, points: PointCloud, *, highest: float = 500.0) -> NDArray[np.float32]:
         """Return the height of each point above the ground, metres, shape (n,); NaN where it is not plausible.
@@ -92,12 +96,17 @@ def heights_of(
     """
     if dem is not None and _is_complete(dem, extent):
         return Heights(dem)
-    filtered = None if points is None else ground_surface(points, extent, cell=cell)
+    filtered, doubtful, doubts = None, None, []
+    if points is not None:
+        filtered, unsure = filtered_ground(points, extent, cell=cell)
+        doubtful, words = Elevation(unsure.astype(np.float32), filtered.grid), doubt_note(unsure)
+        doubts = [words] if words else []
     if filtered is not None and np.isnan(filtered.values).all():
-        filtered = None
+        filtered = doubtful = None
     if dem is None:
         if filtered is not None:
-            return Heights(filtered, ("there is no DEM: the ground was filtered from the points",))
+            notes = "there is no DEM: the ground was filtered from the points", *doubts
+            return Heights(filtered, notes, doubtful)
         grid = Grid.covering(extent, 1.0)
         level = Elevation(np.zeros(grid.shape, dtype=np.float32), grid)
         return Heights(level, ("there is neither a DEM nor a point: the ground was set to 0 m",))
@@ -113,7 +122,8 @@ def heights_of(
             (f"the DEM shows {_share(known)} of the scene, which has no points: the rest was interpolated",),
         )
     if not known.any():
-        return Heights(filtered, ("the DEM shows nothing of the scene: the ground was filtered from the points",))
+        notes = "the DEM shows nothing of the scene: the ground was filtered from the points", *doubts
+        return Heights(filtered, notes, doubtful)
     _fill_voids(ground, known, filtered, grid)
     return Heights(
         Elevation(ground, grid),

@@ -62,10 +62,11 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
 
     None where so few points give no height at all.
     """
-    from ..ground.filter import elevation_from_points, ground_surface
+    from ..ground.doubt import doubt_note
+    from ..ground.filter import elevation_from_points, filtered_ground
 
     check_size(place, cell or 1.0, "dem_cell")
-    classes = points.classification
+    classes, doubt = points.classification, None
     if ground_filter == "cloth":
         from ..ground.cloth import cloth_surface
 
@@ -75,7 +76,8 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
         dem = elevation_from_points(points, place.extent, cell=cell or 1.0, classes=(_GROUND, _WATER))
         how = "from the points of classes 2 (ground) and 9 (water), gaps interpolated"
     else:
-        dem = ground_surface(points, place.extent, cell=cell)
+        dem, unsure = filtered_ground(points, place.extent, cell=cell)
+        doubt = doubt_note(unsure)
         why = ", since no point is classified as ground" if ground_filter is None else ""
         how = f"by a ground filter (progressive opening){why}"
     if not np.isfinite(dem.values).any():
@@ -83,6 +85,8 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
         return None
     how = place.log.derived["dem"] = f"{how}, at {dem.grid.gsd:g} m"
     place.log.note(f"the DEM was derived {how}")
+    if doubt:
+        place.log.note(doubt)
     return dem
 
 
