@@ -1,4 +1,4 @@
-"""Templates of plugins and suites: complete, working examples to start from.
+"""Templates of plugins, packages of plugins and suites: complete, working examples to start from.
 
 ``roofbench new detector NAME`` writes a folder with the example, a test, a README and a workflow that runs the test in
 the user's own repository. Templates are text in which ``@name@``, ``@module@`` and ``@Class@`` are replaced.
@@ -7,6 +7,7 @@ the user's own repository. Templates are text in which ``@name@``, ``@module@`` 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
@@ -19,12 +20,20 @@ from .suite import suite_names
 
 __all__ = ["TEMPLATES", "Template", "write_template"]
 
-Template: TypeAlias = Literal["detector", "evaluator", "suite"]
+Template: TypeAlias = Literal["detector", "evaluator", "suite", "plugin-package"]
 TEMPLATES: tuple[Template, ...] = get_args(Template)
 
 _NAME = re.compile(r"[a-z][a-z0-9]*([_-][a-z0-9]+)*")
 #: Folders of a template's files, by the first part of the file's name.
 _FOLDERS = {"workflow": Path(".github") / "workflows"}
+#: What a package takes from other templates: template and file to the place in the package.
+_IN_A_PACKAGE = {
+    ("detector", "@module@.py"): "src/@module@/detector.py",
+    ("evaluator", "@module@.py"): "src/@module@/evaluator.py",
+    ("detector", "test_@module@.py"): "tests/test_detector.py",
+    ("evaluator", "test_@module@.py"): "tests/test_evaluator.py",
+}
+_PACKAGE_INIT = '"""A building detector and an evaluator for roofbench."""\n'
 
 
 def write_template(template: Template, name: str, folder: Path) -> list[Path]:
@@ -32,7 +41,7 @@ def write_template(template: Template, name: str, folder: Path) -> list[Path]:
 
     Parameters
     ----------
-    template : {"detector", "evaluator", "suite"}
+    template : {"detector", "evaluator", "suite", "plugin-package"}
     name : str
         Lower-case letters and digits, parts separated by ``_`` or ``-``; no name that exists already.
     folder : Path
@@ -48,22 +57,52 @@ def write_template(template: Template, name: str, folder: Path) -> list[Path]:
         raise ParameterError(
             f"{name!r} cannot be used as a name: write lower-case letters and digits, parts separated by _ or -"
         )
-    taken = {"detector": DETECTORS.names, "evaluator": EVALUATORS.names, "suite": suite_names}[template]()
-    if name in taken:
-        raise ParameterError(f"a {template} called {name!r} exists already: choose another name")
-    module = name.replace("-", "_")
-    words = {"@name@": name, "@module@": module, "@Class@": "".join(part.capitalize() for part in module.split("_"))}
+    _require_free(template, name)
     written = []
     with whole_folder(folder, holds=()) as scratch:
-        for source in sorted(resources.files(__package__).joinpath("templates", template).iterdir(), key=str):
-            target = Path(_filled(source.name.removesuffix(".template"), words))
-            place = _FOLDERS.get(target.name.partition("-")[0])
-            if place is not None:
-                target = place / target.name.partition("-")[2]
+        for target, text in _files(template, name):
             (scratch / target).parent.mkdir(parents=True, exist_ok=True)
-            (scratch / target).write_text(_filled(source.read_text("utf-8"), words), encoding="utf-8")
+            (scratch / target).write_text(text, encoding="utf-8")
             written.append(folder / target)
     return written
+
+
+def _require_free(template: Template, name: str) -> None:
+    kinds = {"detector": DETECTORS.names, "evaluator": EVALUATORS.names, "suite": suite_names}
+    kind = "detector" if template == "plugin-package" else template
+    if name in kinds[kind]():
+        raise ParameterError(f"a {kind} called {name!r} exists already: choose another name")
+
+
+def _files(template: Template, name: str) -> Iterator[tuple[Path, str]]:
+    """Yield the place and the text of every file."""
+    words = _words(name)
+    for file, text in _sources(template):
+        target = Path(_filled(file, words))
+        place = _FOLDERS.get(target.name.partition("-")[0])
+        yield (target if place is None else place / target.name.partition("-")[2]), _filled(text, words)
+    if template == "plugin-package":
+        module = words["@module@"]
+        yield Path("src") / module / "__init__.py", _PACKAGE_INIT
+        for (part, file), inside in _IN_A_PACKAGE.items():
+            own = words if part == "detector" else {**_words(f"{name}-score"), "@module@": module}
+            text = dict(_sources(part))[file]
+            # A package is imported; a single file is named by its path.
+            text = text.replace("from @module@ import", "from @module@.evaluator import")
+            text = text.replace("with_name('@module@.py')", "parents[1] / 'src' / '@module@' / 'detector.py'")
+            text = text.replace("Path(__file__).parents", "Path(__file__).resolve().parents")
+            yield Path(_filled(inside, words)), _filled(text, own)
+
+
+def _words(name: str) -> dict[str, str]:
+    module = name.replace("-", "_")
+    return {"@name@": name, "@module@": module, "@Class@": "".join(part.capitalize() for part in module.split("_"))}
+
+
+def _sources(template: str) -> Iterator[tuple[str, str]]:
+    """Yield the name of each file of a template and its text, not filled in yet."""
+    for source in sorted(resources.files(__package__).joinpath("templates", template).iterdir(), key=str):
+        yield source.name.removesuffix(".template"), source.read_text("utf-8")
 
 
 def _filled(text: str, words: dict[str, str]) -> str:

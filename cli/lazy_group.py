@@ -29,7 +29,7 @@ COMMANDS = {
     "scenes": ("scenes:app", "Make, import, index, check, list and show scenes."),
     "list": ("list:list_names", "List detectors, evaluators, suites, scenes, indices."),
     "info": ("info:info", "Explain one of these names."),
-    "new": ("new:new", "Write a detector, evaluator or suite to start from."),
+    "new": ("new:new", "Write a detector, evaluator, suite or package."),
     "check-plugin": ("check_plugin:check_plugin", "Check a detector or evaluator."),
     "ls": ("ls:ls", "List stored runs."),
     "why": ("why:why", "Explain what a stored run depends on."),

@@ -1,4 +1,4 @@
-"""``roofbench new``: a detector, evaluator or suite to start from."""
+"""``roofbench new``: a detector, evaluator, suite or package of plugins to start from."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ __all__ = ["new"]
 
 def new(
     template: Annotated[
-        Literal["detector", "evaluator", "suite"],
-        typer.Argument(metavar="KIND", help="detector, evaluator or suite."),
+        Literal["detector", "evaluator", "suite", "plugin-package"],
+        typer.Argument(metavar="KIND", help="detector, evaluator, suite or plugin-package."),
     ],
     name: Annotated[
         str, typer.Argument(metavar="NAME", help="Lower-case letters and digits, parts separated by _ or -.")
@@ -23,6 +23,8 @@ def new(
     ] = None,
 ) -> None:
     """Write a complete working example with a test, a README and a CI workflow.
+
+    A plugin-package is a Python package with a detector and an evaluator, ready to be installed and published.
 
     Example: roofbench new detector my-detector && cd my-detector && pytest
     """

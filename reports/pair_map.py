@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..evaluators.uncertainty.paired import FATES, Fate, PairedComparison
+from ..evaluators.uncertainty.paired import FATES, PairedComparison
 from ..evaluators.verdict_table import Verdicts
 from .format import shortened
 from .map_elements import add_scale_bar, polygon_paths
 from .pair_text import FATE_WORDS, objects_line
 from .places import places_of
+from .verdict_style import FATE_LOOKS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,22 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["pair_figure"]
 
 #: Colours of Okabe & Ito.
-_BLUE, _ORANGE, _GREEN, _GREY = "#0072B2", "#D55E00", "#009E73", "#BBBBBB"
-
-
-class _Look(NamedTuple):
-    colour: str
-    opacity: float
-    hatch: str | None = None
-
-
-_LOOKS: dict[Fate, _Look] = {
-    "both": _Look(_GREEN, 0.35),
-    "only A": _Look(_BLUE, 0.85),
-    "only B": _Look(_ORANGE, 0.85),
-    "neither": _Look("#000000", 0.15, "////"),
-    "left out": _Look(_GREY, 0.3),
-}
+_BLUE, _ORANGE = "#0072B2", "#D55E00"
 
 
 def pair_figure(found: PairedComparison, *, title: str, area: shapely.Geometry | None = None) -> Figure:
@@ -85,7 +71,7 @@ def _groups(found: PairedComparison, one: Verdicts, two: Verdicts) -> list[tuple
     """Return what is drawn with one look, in drawing order: polygons, and look with label."""
     groups: list[tuple[NDArray[np.object_], dict[str, Any]]] = []
     for fate in FATES:
-        style, polygons = _LOOKS[fate], one.reference.polygons[found.fates == fate]
+        style, polygons = FATE_LOOKS[fate], one.reference.polygons[found.fates == fate]
         groups.append(
             (
                 polygons,

@@ -11,8 +11,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..evaluators.threshold_free.verdicts import VERDICT_KINDS
 from ..evaluators.uncertainty.paired_files import PairedFiles
 from ..evaluators.verdict_table import VerdictTable
+from .qgis_style import pair_styles
 from .streamed_layers import Rows, StreamedLayer, write_streamed
 from .verdict_stream import verdict_fields, verdict_rows
 
@@ -45,7 +47,9 @@ def write_pair_stream(found: PairedFiles, path: str | os.PathLike[str], *, overw
             )
             for place, name in enumerate("ab")
         ]
-        write_streamed(layers, path, layer="comparison", overwrite=overwrite, scratch=files.work)
+        write_streamed(
+            layers, path, layer="comparison", styles=pair_styles(VERDICT_KINDS), overwrite=overwrite, scratch=files.work
+        )
 
 
 def _detections(found: PairedFiles, place: int) -> Rows:

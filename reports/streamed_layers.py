@@ -29,6 +29,7 @@ from ..core.plain_paths import plain_target
 from ..scenes.geodata.crs import parse_crs
 from ..scenes.geodata.footprint_stream import FootprintStream, wkb_buffers
 from ..scenes.geodata.footprints import Footprints
+from ..scenes.geodata.layer_styles import add_layer_styles
 from ..scenes.geodata.vector_files import output_driver
 from ..scenes.geodata.wkb import geometries_of_wkb
 
@@ -137,6 +138,7 @@ def write_streamed(
     path: str | os.PathLike[str],
     *,
     layer: str,
+    styles: Mapping[str, str],
     overwrite: bool = False,
     scratch: Path | None = None,
 ) -> None:
@@ -151,6 +153,8 @@ def write_streamed(
     path : str or path
     layer : str
         Name of the only layer of a FlatGeobuf file.
+    styles : mapping of str to str
+        Of QGIS, by layer of a GeoPackage.
     overwrite : bool
     scratch : Path, optional
         Folder for the unfinished file, on the file system of `path`; by default beside it.
@@ -166,6 +170,7 @@ def write_streamed(
                 schema = side.schema.remove(side.schema.get_field_index("side"))
                 batches = _ahead(side.batches(schema))
                 _write_ogr(pyarrow.RecordBatchReader.from_batches(schema, batches), file, driver, side.name, crs)
+            add_layer_styles(file, styles)
             return
         try:
             joined = pyarrow.unify_schemas([side.schema for side in sides], promote_options="permissive")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..evaluators.uncertainty.paired import PairedComparison
 from ..evaluators.verdict_table import Verdicts
 from ..scenes.geodata.vector_files import write_layers
+from .qgis_style import pair_styles, verdict_styles
 
 __all__ = ["write_pair", "write_verdicts"]
 
@@ -20,11 +21,11 @@ __all__ = ["write_pair", "write_verdicts"]
 def write_verdicts(verdicts: Verdicts, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write one row per object with verdict, partner and reason.
 
-    A GeoPackage gets the layers ``detections`` and ``references``; other formats, which hold one layer, get both in
-    one, distinguished by the column ``side``.
+    A GeoPackage gets the layers ``detections`` and ``references``, each with a style for QGIS; other formats, which
+    hold one layer, get both in one, distinguished by the column ``side``.
     """
     tables = {f"{side}s": (footprints.polygons, verdicts.columns(side)) for side, _, footprints in verdicts.sides}
-    _write(tables, path, crs=verdicts.crs, overwrite=overwrite, column="side", layer="verdicts")
+    _write(tables, path, crs=verdicts.crs, styles=verdict_styles(verdicts.kinds), overwrite=overwrite)
 
 
 def write_pair(found: PairedComparison, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
@@ -46,7 +47,7 @@ def write_pair(found: PairedComparison, path: str | os.PathLike[str], *, overwri
         "detections_a": (one.detected.polygons, one.columns("detection")),
         "detections_b": (two.detected.polygons, two.columns("detection")),
     }
-    _write(tables, path, crs=one.crs or two.crs, overwrite=overwrite, column="side", layer="comparison")
+    _write(tables, path, crs=one.crs or two.crs, styles=pair_styles(one.kinds), overwrite=overwrite, layer="comparison")
 
 
 def _write(
@@ -54,11 +55,11 @@ def _write(
     path: str | os.PathLike[str],
     *,
     crs: str | None,
+    styles: Mapping[str, str],
     overwrite: bool,
-    column: str,
-    layer: str,
+    layer: str = "verdicts",
 ) -> None:
-    """Write tables as layers of a GeoPackage, else as one layer with a column that names the table."""
+    """Write tables as layers of a GeoPackage, else as one layer with the column ``side`` that names the table."""
     # GDAL takes a GeoJSON property "id" for the feature's own number, which must be unique.
     named = {
         key: (polygons, {"source_id" if name == "id" else name: values for name, values in table.items()})
@@ -66,14 +67,14 @@ def _write(
     }
     if Path(path).suffix.lower() != ".gpkg":
         for key, (polygons, table) in named.items():
-            table[column] = np.full(
+            table["side"] = np.full(
                 len(polygons), key.replace("detections", "detection").replace("references", "reference"), dtype=object
             )
         names = dict.fromkeys(name for _, table in named.values() for name in table)
         counts = [len(polygons) for polygons, _ in named.values()]
         columns = {name: _joined([table.get(name) for _, table in named.values()], counts) for name in names}
         named = {layer: (np.concatenate([polygons for polygons, _ in named.values()]), columns)}
-    write_layers(named, path, crs=crs, overwrite=overwrite)
+    write_layers(named, path, crs=crs, styles=styles, overwrite=overwrite)
 
 
 def _joined(columns: Sequence[NDArray[Any] | None], counts: Sequence[int]) -> NDArray[Any]:

@@ -6,11 +6,14 @@ Colours are those of Okabe & Ito, which people with any colour vision can distin
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..evaluators.verdict_table import ColourRole, Side, VerdictKind, Verdicts
 
-__all__ = ["ROLE_STYLE", "RoleStyle", "filled_kinds"]
+if TYPE_CHECKING:
+    from ..evaluators.uncertainty.paired import Fate
+
+__all__ = ["FATE_LOOKS", "ROLE_STYLE", "FateLook", "RoleStyle", "filled_kinds"]
 
 
 class RoleStyle(NamedTuple):
@@ -30,6 +33,23 @@ ROLE_STYLE: Mapping[ColourRole, RoleStyle] = {
     "missing": RoleStyle("#0072B2", "////", 0.35, 0.3, 0.9),
     "left out": RoleStyle("#BBBBBB", None, 0.35, 0.2, 0.2),
     "outline": RoleStyle("#000000", None, 0.0, 0.0, 0.0),
+}
+
+
+class FateLook(NamedTuple):
+    """Colour, opacity and matplotlib hatch of what becomes of a reference in two detections."""
+
+    colour: str
+    opacity: float
+    hatch: str | None = None
+
+
+FATE_LOOKS: Mapping[Fate, FateLook] = {
+    "both": FateLook("#009E73", 0.35),
+    "only A": FateLook("#0072B2", 0.85),
+    "only B": FateLook("#D55E00", 0.85),
+    "neither": FateLook("#000000", 0.15, "////"),
+    "left out": FateLook("#BBBBBB", 0.3),
 }
 
 

@@ -25,6 +25,7 @@ from ...core.registry import nearest_hint
 from .crs import common_crs, crs_label, file_crs, named_crs, parse_crs, require_metric, same_crs
 from .footprints import Footprints
 from .label_images import ENDINGS, read_labels
+from .layer_styles import add_layer_styles
 from .ogr_layers import layer_names, quiet, read_layer
 from .parquet_files import read_parquet, write_parquet
 from .polygon_repair import Repair
@@ -200,11 +201,13 @@ def write_layers(
     path: str | os.PathLike[str],
     *,
     crs: str | None,
+    styles: Mapping[str, str] | None = None,
     overwrite: bool = False,
 ) -> None:
     """Write named layers of (geometries, columns) into one file; only GeoPackage takes more than one.
 
-    Lines and polygons may be mixed between layers, not within one.
+    Lines and polygons may be mixed between layers, not within one. `styles` are those of QGIS by layer
+    (`layer_styles`); only a GeoPackage takes them.
     """
     file = Path(path)
     driver = output_driver(file)
@@ -225,6 +228,8 @@ def write_layers(
                 write_parquet(plain, geometries, columns, crs)
             else:
                 _write_ogr(plain, driver, layer, geometries, columns, crs, append=number > 0)
+        if styles and driver == "GPKG":
+            add_layer_styles(plain, styles)
 
 
 @contextmanager

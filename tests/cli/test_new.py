@@ -18,7 +18,8 @@ from roofbench.core.errors import OutputError, ParameterError
 @pytest.fixture(params=TEMPLATES)
 def written(request, tmp_path):
     """Return a template and the folder that it was written to."""
-    name = {"detector": "first-try", "evaluator": "cover", "suite": "my-city"}[request.param]
+    names = {"detector": "first-try", "evaluator": "cover", "suite": "my-city", "plugin-package": "own-tools"}
+    name = names[request.param]
     files = roofbench("new", request.param, name, folder=tmp_path).stdout.split()
     assert sorted(files) == sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
     return request.param, tmp_path / name
@@ -39,12 +40,31 @@ def test_its_files_are_complete(written):
     assert not [name for name, text in texts.items() if re.search(r"@\w+@", name + text)]
     (workflow,) = folder.glob(".github/workflows/*.yml")
     assert "pytest" in workflow.read_text()
-    if template != "suite":
+    if template in ("detector", "evaluator"):
         project = tomllib.loads(texts["pyproject.toml"])
         ((name, target),) = project["project"]["entry-points"][f"roofbench.{template}s"].items()
         module, _, attribute = target.partition(":")
         assert name == folder.name
         assert f"class {attribute}(" in texts[f"{module}.py"]
+
+
+def test_the_plugins_of_an_installed_package_are_found_by_name(tmp_path):
+    """Without a package index: its metadata are written by the setuptools at hand, as an editable installation does."""
+    roofbench("new", "plugin-package", "own-tools", folder=tmp_path)
+    folder = tmp_path / "own-tools"
+    command = [sys.executable, "-c", "import setuptools; setuptools.setup()", "-q", "egg_info"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    path = os.pathsep.join([str(folder / "src"), str(Path(rb.__file__).parents[1])])
+    code = (
+        "import roofbench as rb\n"
+        "print(rb.make_detector('own-tools', height=3), rb.make_evaluator('own-tools-score'))\n"
+        "print(len(rb.detect('hamlet', 'own-tools')))"
+    )
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, env=environment)
+    assert done.stdout.splitlines()[0] == "OwnTools(height=3.0) OwnToolsScore()", done.stderr
+    assert int(done.stdout.splitlines()[1]) > 0
 
 
 def test_a_new_detector_gets_on_the_leaderboard(tmp_path):

@@ -26,7 +26,7 @@ PICTURE = ("U-Net34", "DeepLabV3Plus50")
 
 
 def main(file, reference="Blackshark_ai", folder=None):
-    layers = {name: rb.read_footprints(file, layer=name) for name, _ in pyogrio.list_layers(file)}
+    layers = {name: rb.read_footprints(file, layer=name) for name, kind in pyogrio.list_layers(file) if kind}
     truth = layers.pop(reference)
     print(f"## Values against {reference}, with 95 % intervals and the change under a reference redrawn by 0.3 m\n")
     values(layers, truth)
