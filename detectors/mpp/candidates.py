@@ -21,7 +21,7 @@ import numpy as np
 
 from ...core.kernels import kernel
 from .arrays import Heights, Integers, Labels, Mask, Rectangles
-from .patches import cells_of_patches, label_patches
+from .patches import Division, cells_of_patches, divide_patches, label_patches
 from .threads import ONE_THREAD, Threads
 
 __all__ = ["propose_boxes"]
@@ -42,6 +42,7 @@ def propose_boxes(
     *,
     steps: tuple[float, ...],
     least_cells: int,
+    division: Division | None = None,
     threads: Threads = ONE_THREAD,
 ) -> Rectangles:
     """Return boxes of the patches of several step limits, shape (n, 5), without duplicates.
@@ -56,11 +57,15 @@ def propose_boxes(
         Limits in metres, rising.
     least_cells : int
         Smaller patches and pieces are left out.
+    division : Division, optional
+        Where patches longer than any building are divided.
     threads : Threads
     """
     boxes, finer = [np.empty((0, 5))], np.zeros((1, 1), dtype=np.int32)
     for step in steps:
         labels, count = label_patches(height, roof, round(100 * step), threads=threads)
+        if division is not None:
+            labels, count = divide_patches(labels, count, division)
         boxes += _boxes_of_patches(labels, count, finer, least_cells, threads)
         finer = labels
     together = np.concatenate(boxes)

@@ -19,6 +19,7 @@ of a patch is that of its first cell, so labels do not depend on the bands.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,7 +28,22 @@ from .arrays import Heights, Integers, Labels, Mask, States
 from .cells import VOID
 from .threads import ONE_THREAD, Threads
 
-__all__ = ["Rims", "cells_of_patches", "count_rims", "label_patches", "patch_sizes"]
+__all__ = ["Division", "Rims", "cells_of_patches", "count_rims", "divide_patches", "label_patches", "patch_sizes"]
+
+
+class Division(NamedTuple):
+    """The grid of squares that divides long patches, in cells.
+
+    Attributes
+    ----------
+    row, column : int
+        Number of the first row and column, counted from the origin of the CRS.
+    side : int
+    """
+
+    row: int
+    column: int
+    side: int
 
 
 def label_patches(
@@ -56,6 +72,28 @@ def label_patches(
         _join_rows(height, labels, step, row, parent)
     count = _renumber(parent, bands, height.shape[1])
     threads.bands(lambda first, last: _relabel(labels, parent, first, last), len(height))
+    return labels, count
+
+
+def divide_patches(labels: Labels, count: int, division: Division) -> tuple[Labels, int]:
+    """Divide the patches that are longer than a square, along rows or columns, at the borders of the squares, in place.
+
+    No building is so long. A terrace or a wood can be, and what is made of it must not depend on its far end, which a
+    window may not show. Return the labels, pieces after all others, and how many there are.
+    """
+    from scipy.ndimage import find_objects
+
+    for number, place in enumerate(find_objects(labels, count), start=1):
+        if place is None or max(part.stop - part.start for part in place) <= division.side:
+            continue
+        part = labels[place]
+        row, column = np.nonzero(part == number)
+        square_row = (row + place[0].start + division.row) // division.side
+        square_column = (column + place[1].start + division.column) // division.side
+        squares = np.stack([square_row, square_column], axis=1)
+        _, piece = np.unique(squares, axis=0, return_inverse=True)
+        part[row, column] = np.where(piece.ravel() == 0, number, count + piece.ravel())
+        count += int(piece.max())
     return labels, count
 
 

@@ -26,8 +26,10 @@ from .cells import cell_size, make_cells
 from .energy import Model, rectangle_energies
 from .memory import release_memory
 from .parameters import MPPParameters
+from .patches import Division
 from .return_numbers import MULTIPLE, cues_of
 from .scores import Weights, fitted_cells, score_cells
+from .squares import side_of
 from .superstructures import lower_superstructures
 from .tables import LONGEST, TALLEST, Tables, make_tables
 from .textures import textures
@@ -92,13 +94,21 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
         )
     background, height, state, score, fitted, cues = _classes(parameters, points, scene, cell, threads)
     least = math.ceil(_SMALLEST_BOX / cell**2)
-    boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, threads=threads)
+    division = _division(parameters, Grid.covering(scene.extent, cell))
+    boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, division=division, threads=threads)
     kept = _shortened(height, threads)
     del height
     release_memory()
     tables = make_tables(kept, fitted, score, threads=threads)
     model, grid = _model(parameters, cell), Grid.covering(scene.extent, cell)
     return Prepared(grid, kept, state, score, background, tables, model, _rated(boxes, tables, model, threads), cues)
+
+
+def _division(parameters: MPPParameters, grid: Grid) -> Division:
+    """Return the squares at whose borders long patches are divided."""
+    return Division(
+        -round(grid.north / grid.gsd), round(grid.west / grid.gsd), round(side_of(parameters.largest_side) / grid.gsd)
+    )
 
 
 def _rated(rectangles: Rectangles, tables: Tables, model: Model, threads: Threads) -> Boxes:
@@ -157,6 +167,7 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
             step=parameters.roof_step,
             share=parameters.carried_share,
             most=int(_LARGEST_STRUCTURE / cell**2),
+            division=_division(parameters, grid),
             threads=threads,
         )
         cells = replace(cells, height=height, state=state)

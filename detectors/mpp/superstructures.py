@@ -25,7 +25,7 @@ from .arrays import Heights, Labels, Mask, States
 from .candidates import propose_boxes
 from .cells import HIGH, LOW
 from .frames import lower_storeys
-from .patches import count_rims, label_patches
+from .patches import Division, count_rims, label_patches
 from .roughness import assign_rough_cells
 from .threads import ONE_THREAD, Threads
 
@@ -35,6 +35,8 @@ __all__ = ["lower_superstructures"]
 _LEDGE = 30
 #: Longest run of void cells that a tower's shadow leaves on a roof.
 _SHADOW = 12
+#: Largest number of superstructures on top of each other.
+_ROUNDS = 5
 #: Centimetres: more than any two heights differ by.
 _ANY = 1 << 30
 #: States of the cells that are to be lowered.
@@ -49,7 +51,7 @@ def lower_superstructures(
     step: float,
     share: float,
     most: int,
-    rounds: int = 5,
+    division: Division | None = None,
     threads: Threads = ONE_THREAD,
 ) -> tuple[Heights, States]:
     """Return heights and states with superstructures lowered to the roofs that carry them, and their shadows filled.
@@ -67,19 +69,19 @@ def lower_superstructures(
         Share of the rim that must be lower roof; more than 1 changes nothing.
     most : int
         Largest number of cells of a roof structure.
-    rounds : int
-        Largest number of superstructures on top of each other.
+    division : Division, optional
+        Where patches longer than any building are divided.
     threads : Threads
     """
     if share > 1:
         return height, state
     limit = round(100 * step)
-    lowered, state = _lower_storeys(height, state, roof, limit, threads)
+    lowered, state = _lower_storeys(height, state, roof, limit, division, threads)
     labels, count = label_patches(lowered, roof, limit, threads=threads)
     assign_rough_cells(lowered, state, labels, threads=threads)
     if _level_structures(lowered, state, labels, share, most, threads):
         labels, count = label_patches(lowered, labels, limit, threads=threads)
-    for turn in range(rounds):
+    for turn in range(_ROUNDS):
         if turn > 0:
             labels, count = label_patches(lowered, labels, limit, threads=threads)
         if not _lower(lowered, state, labels, count, share, limit, threads):
@@ -87,7 +89,9 @@ def lower_superstructures(
     return lowered, state
 
 
-def _lower_storeys(height: Heights, state: States, roof: Mask, step: int, threads: Threads) -> tuple[Heights, States]:
+def _lower_storeys(
+    height: Heights, state: States, roof: Mask, step: int, division: Division | None, threads: Threads
+) -> tuple[Heights, States]:
     """Return heights and states with the storeys of frames lowered."""
     rows, columns = state.shape
     smooth, lowered, filled = np.empty_like(height), np.empty_like(height), np.empty_like(state)
@@ -109,8 +113,8 @@ def _lower_storeys(height: Heights, state: States, roof: Mask, step: int, thread
     threads.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
     boxes = np.concatenate(
         [
-            propose_boxes(smooth, solid, steps=(1e6,), least_cells=24, threads=threads),
-            propose_boxes(smooth, labels, steps=(0.01 * step,), least_cells=24, threads=threads),
+            propose_boxes(smooth, solid, steps=(1e6,), least_cells=24, division=division, threads=threads),
+            propose_boxes(smooth, labels, steps=(0.01 * step,), least_cells=24, division=division, threads=threads),
         ]
     )
     boxes = boxes[np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")]

@@ -9,7 +9,14 @@ from naive import patches as naive
 from roofbench.detectors.mpp.candidates import propose_boxes
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID
 from roofbench.detectors.mpp.frames import _REACH, _cells_of, _waves
-from roofbench.detectors.mpp.patches import cells_of_patches, count_rims, label_patches, patch_sizes
+from roofbench.detectors.mpp.patches import (
+    Division,
+    cells_of_patches,
+    count_rims,
+    divide_patches,
+    label_patches,
+    patch_sizes,
+)
 from roofbench.detectors.mpp.rectangles import corners
 from roofbench.detectors.mpp.roughness import assign_rough_cells
 from roofbench.detectors.mpp.superstructures import _lower_to_roof, lower_superstructures
@@ -173,3 +180,20 @@ def test_a_house_cut_by_the_border_of_the_scene_keeps_the_direction_of_its_walls
     turn = (largest[4] - angle + np.pi / 4) % (np.pi / 2) - np.pi / 4
     assert abs(turn) < np.radians(1.5)
     assert largest[2] * largest[3] > 0.5 * roof.sum()
+
+
+def test_patches_longer_than_a_square_are_divided_at_borders_that_do_not_depend_on_the_window():
+    rng = np.random.default_rng(4)
+    roof = rng.random((60, 70)) < 0.5
+    roof[20:24] = True
+    height = np.full(roof.shape, 500, np.int32)
+    whole, count = divide_patches(*label_patches(height, roof, 10), Division(100, 200, 16))
+    sizes = [(np.ptp(row), np.ptp(column)) for row, column in (np.nonzero(whole == k) for k in range(1, count + 1))]
+    assert max(max(size) for size in sizes) < 16
+    assert np.array_equal(whole > 0, roof)
+    # Pieces of a window, 24 cells inside it, are those of the whole.
+    part = np.s_[7:60, 5:70]
+    seen, _ = divide_patches(*label_patches(height[part], roof[part], 10), Division(107, 205, 16))
+    inner, same = seen[24:-24, 24:-24], whole[part][24:-24, 24:-24]
+    pairs = np.unique(np.stack([inner.ravel(), same.ravel()]), axis=1)
+    assert len(np.unique(pairs[0])) == len(np.unique(pairs[1])) == pairs.shape[1] > 5
