@@ -10,12 +10,14 @@ import json
 import os
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 __all__ = ["Outcome", "Sandbox"]
 
-#: A call that takes longer hangs, s; one that takes more memory is not bounded, bytes.
+#: A call that takes more processor time hangs, s; so does one that waits as long, whatever for. One that takes more
+#: memory is not bounded, bytes.
 MOST_SECONDS = 10.0
 MOST_MEMORY = 6 << 30
 
@@ -41,10 +43,12 @@ class Sandbox:
             [sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
         )
 
-    def run(self, *arguments: object, folder: Path) -> Outcome:
+    def run(self, *arguments: object, folder: Path, user: int | None = None, seconds: float = MOST_SECONDS) -> Outcome:
+        """Run a call; `user` is the number of another user, whose permissions count, and `seconds` when it hangs."""
         assert self._server.stdin is not None
         assert self._server.stdout is not None
         request = {"arguments": [str(argument) for argument in arguments], "folder": str(folder)}
+        request |= {"user": user, "seconds": seconds}
         self._server.stdin.write(json.dumps(request) + "\n")
         self._server.stdin.flush()
         return Outcome(**json.loads(self._server.stdout.readline()))
@@ -57,7 +61,7 @@ class Sandbox:
         self._server.stdout.close()
 
 
-def _call(arguments: list[str], streams: list[int]) -> None:
+def _call(arguments: list[str], streams: list[int], user: int | None) -> None:
     """Become a process that runs the command line; never returns."""
     import gc
     import resource
@@ -69,6 +73,10 @@ def _call(arguments: list[str], streams: list[int]) -> None:
     try:
         os.setpgid(0, 0)
         resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+        if user is not None:
+            os.setgroups([])
+            os.setgid(user)
+            os.setuid(user)
         for number, stream in enumerate(streams, start=1):
             os.dup2(stream, number)
         sys.stdout, sys.stderr = (os.fdopen(os.dup(number), "w", errors="backslashreplace") for number in (1, 2))
@@ -90,10 +98,34 @@ def _call(arguments: list[str], streams: list[int]) -> None:
         os._exit(code)
 
 
+class _Watch:
+    """Whether a process has hung: by its processor time, or by the time that it neither ran nor waited to run.
+
+    Time by the clock would count what other processes of a busy machine take.
+    """
+
+    def __init__(self, process: int, seconds: float) -> None:
+        self._path, self._seconds = f"/proc/{process}/stat", seconds
+        self._last = time.monotonic()
+        self._idle = 0.0
+
+    def hung(self) -> bool:
+        now, last = time.monotonic(), self._last
+        self._last = now
+        try:
+            with open(self._path) as stream:
+                facts = stream.read().rpartition(")")[2].split()
+        except OSError:
+            return False
+        if facts[0] != "R":
+            self._idle += now - last
+        used = sum(map(int, facts[11:15])) / os.sysconf("SC_CLK_TCK")
+        return used > self._seconds or self._idle - used > self._seconds
+
+
 def _serve() -> None:
     import signal
     import tempfile
-    import time
     import warnings
 
     import geopandas  # noqa: F401
@@ -115,13 +147,13 @@ def _serve() -> None:
             start = time.monotonic()
             child = os.fork()
             if not child:
-                _call(request["arguments"], [stdout.fileno(), stderr.fileno()])
-            hung = False
+                _call(request["arguments"], [stdout.fileno(), stderr.fileno()], request["user"])
+            hung, watch = False, _Watch(child, request["seconds"])
             while True:
                 ended, status, usage = os.wait4(child, os.WNOHANG)
                 if ended:
                     break
-                if not hung and time.monotonic() - start > MOST_SECONDS:
+                if not hung and watch.hung():
                     hung = True
                     os.kill(child, signal.SIGKILL)
                 time.sleep(0.005)
