@@ -205,12 +205,12 @@ def _count(cloud: _Cloud, band: _Band, low: int, counts: Labels) -> None:
         height = _above(cloud, i)
         if height == _OUTLIER:
             continue
-        counts[k, _Count.POINTS] += 1
+        counts[k, _Count.POINTS.value] += 1
         if height > low:
-            counts[k, _Count.HIGH_POINTS] += 1
-            counts[k, _Count.TOP] = max(counts[k, _Count.TOP], height)
+            counts[k, _Count.HIGH_POINTS.value] += 1
+            counts[k, _Count.TOP.value] = max(counts[k, _Count.TOP.value], height)
         if len(cloud.returns) > 0 and cloud.returns[i] > 1:
-            counts[k, _Count.MULTIPLE] += 1
+            counts[k, _Count.MULTIPLE.value] += 1
 
 
 @kernel
@@ -221,10 +221,10 @@ def _add_tops(cloud: _Cloud, band: _Band, counts: Labels, tops: Labels) -> None:
     """
     for i in range(len(cloud.x)):
         k = _cell_of(cloud.x[i], cloud.y[i], band)
-        if k < 0 or 2 * counts[k, _Count.HIGH_POINTS] <= counts[k, _Count.POINTS]:
+        if k < 0 or 2 * counts[k, _Count.HIGH_POINTS.value] <= counts[k, _Count.POINTS.value]:
             continue
         height = _above(cloud, i)
-        if height != _OUTLIER and height >= counts[k, _Count.TOP] - _NEAR_TOP:
+        if height != _OUTLIER and height >= counts[k, _Count.TOP.value] - _NEAR_TOP:
             tops[k, 0] += 1
             tops[k, 1] += height
 
@@ -238,7 +238,11 @@ def _summarise(
     for r in range(first, last):
         for c in range(columns):
             k = r * columns + c
-            n, high, many = counts[k, _Count.POINTS], counts[k, _Count.HIGH_POINTS], counts[k, _Count.MULTIPLE]
+            n, high, many = (
+                counts[k, _Count.POINTS.value],
+                counts[k, _Count.HIGH_POINTS.value],
+                counts[k, _Count.MULTIPLE.value],
+            )
             height[r, c], openness[r, c] = 0, 0
             if n == 0:
                 state[r, c] = VOID

@@ -284,6 +284,6 @@ def run_printed(
         value = total + count * log_lambda - math.lgamma(count + 1.0)
         if value > best_value:
             best, best_value = buildings[:count].copy(), value
-        trace[row, PrintedTrace.ITERATIONS] = t + 1
-        trace[row, PrintedTrace.ENERGY], trace[row, PrintedTrace.BUILDINGS] = -value, count
+        trace[row, PrintedTrace.ITERATIONS.value] = t + 1
+        trace[row, PrintedTrace.ENERGY.value], trace[row, PrintedTrace.BUILDINGS.value] = -value, count
     return best, trace

@@ -345,8 +345,8 @@ def run_chain(
             if energy < best_energy - _BETTER and temperature < _COLD_ENOUGH * schedule.cold:
                 best, best_energy = chain.rectangles[:count].copy(), energy
         if t % schedule.stride == schedule.stride - 1 or t == schedule.proposals - 1:
-            trace[row, Trace.PROPOSALS], trace[row, Trace.TEMPERATURE] = t + 1, temperature
-            trace[row, Trace.ENERGY], trace[row, Trace.BUILDINGS] = energy, count
+            trace[row, Trace.PROPOSALS.value], trace[row, Trace.TEMPERATURE.value] = t + 1, temperature
+            trace[row, Trace.ENERGY.value], trace[row, Trace.BUILDINGS.value] = energy, count
             if energy < best_energy - _BETTER:
                 best, best_energy = chain.rectangles[:count].copy(), energy
     return best, chain.rectangles[:count].copy(), trace, best_energy
