@@ -4,24 +4,44 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["messages", "table_console"]
+__all__ = ["messages", "printable", "say", "table_console"]
+
+
+def printable(text: str) -> str:
+    """Return text without control characters other than line ends: in names, they could change the terminal."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
+
+
+def say(text: str) -> None:
+    """Print a message to standard error."""
+    typer.echo(printable(text), err=True)
 
 
 def messages(quiet: bool = False) -> Console:
     """Return the console for messages and progress: standard error, plain when it is no terminal."""
-    from rich.console import Console
-
-    return Console(stderr=True, quiet=quiet, highlight=False)
+    return _console(stderr=True, quiet=quiet)
 
 
 def table_console() -> Console:
     """Return the console for tables: standard output, wide where neither a terminal nor COLUMNS sets its width."""
+    known = sys.stdout.isatty() or "COLUMNS" in os.environ
+    return _console(width=None if known else 160)
+
+
+def _console(**options: Any) -> Console:
     from rich.console import Console
 
-    known = sys.stdout.isatty() or "COLUMNS" in os.environ
-    return Console(highlight=False, width=None if known else 160)
+    class Printable(Console):
+        def print(self, *objects: Any, **more: Any) -> None:
+            super().print(*(printable(item) if isinstance(item, str) else item for item in objects), **more)
+
+    return Printable(highlight=False, **options)

@@ -14,6 +14,7 @@ import typer
 from ..core.errors import ParameterError, ProgramError, RoofbenchError
 from . import completion
 from .command import load_plugins
+from .console import say
 from .options import (
     JobsOption,
     MemoryLimitOption,
@@ -133,12 +134,12 @@ def detect(
         write_footprints(found, output, overwrite=overwrite)
         if not quiet:
             for note in found.metadata.get("notes", ()):
-                typer.echo(f"note: {place.name}: {note}", err=True)
-            typer.echo(f"{output}: {len(found)} footprints on {place.name} in {seconds:.2f} CPU seconds", err=True)
+                say(f"note: {place.name}: {note}")
+            say(f"{output}: {len(found)} footprints on {place.name} in {seconds:.2f} CPU seconds")
     if steps is not None:
         count = _write_steps(chosen, place, seed, steps, overwrite)
         if not quiet:
-            typer.echo(f"{steps}: {count} pictures", err=True)
+            say(f"{steps}: {count} pictures")
 
 
 def _refuse_without_tiles(halo: float | None, scheduler: str | None, jobs: int) -> None:
@@ -166,14 +167,12 @@ def _failures_reported(detector: Detector, scene: Scene) -> Iterator[None]:
         with redirect_stdout(sys.stderr):
             yield
     except ProgramError as error:
-        typer.echo(
-            "\n".join(filter(None, [error.log, f"Error: {detector.name} failed on {scene.name}: {error}"])), err=True
-        )
+        say("\n".join(filter(None, [error.log, f"Error: {detector.name} failed on {scene.name}: {error}"])))
         raise typer.Exit(3) from error
     except (RoofbenchError, OSError, typer.Exit):
         raise
     except (Exception, SystemExit) as error:
         traceback.print_exc(limit=-4)
         sentence = " ".join(f"{type(error).__name__}: {error}".split())
-        typer.echo(f"Error: {detector.name} failed on {scene.name}: {sentence}", err=True)
+        say(f"Error: {detector.name} failed on {scene.name}: {sentence}")
         raise typer.Exit(3) from error

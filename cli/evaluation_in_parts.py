@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import typer
+from .console import messages, say
 
 if TYPE_CHECKING:
     from ..evaluators.base import Evaluation, Evaluator
@@ -149,13 +149,12 @@ def _work_folder(verdicts: Path | None, scheduler: str | None) -> Iterator[Path]
 def _progress(quiet: bool) -> Iterator[tuple[Callable[[str], None], Callable[[int, int], None]]]:
     """Yield a function that says what is done, and one that moves a bar (on a terminal only)."""
     if quiet or not sys.stderr.isatty():
-        yield (lambda sentence: None if quiet else typer.echo(f"- {sentence}", err=True)), lambda done, total: None
+        yield (lambda sentence: None if quiet else say(f"- {sentence}")), lambda done, total: None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=messages(), transient=True) as bar:
         task: Any = None
 
         def move(done: int, total: int) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from . import completion
+from .console import say
 from .options import DEFAULT_STORE, OverwriteOption, RunArgument, StoreOption
 
 __all__ = ["export"]
@@ -37,4 +38,4 @@ def export(
 
     with Store(store, must_exist=True) as opened:
         what = export_run(opened, opened.run(run).id, output, evaluator=evaluator, overwrite=overwrite)
-    typer.echo(f"{output}: {what}", err=True)
+    say(f"{output}: {what}")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-import typer
+from .console import say
 
 if TYPE_CHECKING:
     from shapely import Geometry
@@ -58,14 +58,14 @@ def print_problems(detected: Sequence[Footprints], truth: Truth, *, evaluation_a
     if not quiet:
         for footprints in every:
             for repair in footprints.repairs[:10]:
-                typer.echo(f"{footprints.source}: {repair}", err=True)
+                say(f"{footprints.source}: {repair}")
             if len(footprints.repairs) > 10:
-                typer.echo(f"{footprints.source}: {len(footprints.repairs) - 10} more repaired or left out", err=True)
+                say(f"{footprints.source}: {len(footprints.repairs) - 10} more repaired or left out")
             if not len(footprints):
-                typer.echo(f"{footprints.source}: no footprints", err=True)
+                say(f"{footprints.source}: no footprints")
         for found in detected:
             for warning in place_warnings(found, truth.footprints):
-                typer.echo(warning, err=True)
+                say(warning)
     if evaluation_area and not any(reaches(truth.area, footprints) for footprints in every):
         raise InputError(
             f"{evaluation_area} holds none of the footprints, neither detected nor reference: "

@@ -12,7 +12,7 @@ import typer
 from ..core.errors import InputError, ParameterError
 from . import completion
 from .command import RunOptions, with_run_options
-from .console import messages
+from .console import messages, say
 from .measuring import measure_suite
 from .options import DetectorOption, FormatOption, IndicesOption, OverwriteOption, ScenesOption, SuiteOption
 
@@ -148,7 +148,7 @@ def gate(
     differences = different_scenes(before, after)
     if differences:
         for text in differences[:10]:
-            typer.echo(f"Not comparable: {text}", err=True)
+            say(f"Not comparable: {text}")
         raise typer.Exit(4)
     extra = time_side_by_side(before, after, margin=time_margin, level=level) if time else []
     result = compare(before, after, indices=indices, margins=margins, level=level, extra=extra)

@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from ..core.errors import RoofbenchError
+from .console import printable, say
 from .lazy_group import LazyGroup
 
 __all__ = ["app", "main"]
@@ -68,7 +69,7 @@ def main() -> None:
         sys.exit(2)
     except SystemExit as leaving:
         if leaving.code == _INTERRUPTED:
-            typer.echo("Stopped: no partial file is left; 'roofbench run --resume' continues a run", err=True)
+            say("Stopped: no partial file is left; 'roofbench run --resume' continues a run")
         raise
     except BrokenPipeError:
         # The reader of a pipe (head, less) has gone: not an error.
@@ -88,7 +89,7 @@ def main() -> None:
 
 
 def _print_error(sentence: str) -> None:
-    typer.secho(f"Error: {sentence}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+    typer.secho(f"Error: {printable(sentence)}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
 
 
 def _close_stdout() -> None:

@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from .console import say
+
 __all__ = ["new"]
 
 
@@ -33,4 +35,4 @@ def new(
     folder = output or Path(name)
     for file in write_template(template, name, folder):
         typer.echo(file)
-    typer.echo(f"Next: cd {folder} && pytest; README.md lists further commands", err=True)
+    say(f"Next: cd {folder} && pytest; README.md lists further commands")

@@ -9,6 +9,7 @@ import typer
 
 from ..core.errors import ParameterError, UnknownNameError
 from .command import load_plugins
+from .console import say
 from .options import (
     DEFAULT_STORE,
     DpiOption,
@@ -71,4 +72,4 @@ def plot_sweep(
     save_plot(sensitivity_figure(lines, level=level), output, dpi=dpi, overwrite=overwrite)
     for line in lines:
         if line.break_down:
-            typer.echo(break_down_text(line.break_down), err=True)
+            say(break_down_text(line.break_down))

@@ -12,9 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from ..reports.format import shortened
+from .console import messages, say
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -112,12 +111,11 @@ def import_progress(
 ) -> Iterator[tuple[Callable[[str], None], Callable[[int, int], None] | None]]:
     """Yield a function that prints a note and one that moves the bar, or None without a terminal."""
     if not sys.stderr.isatty():
-        yield (lambda sentence: typer.echo(f"- {sentence}", err=True)), None
+        yield (lambda sentence: say(f"- {sentence}")), None
         return
-    from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    with Progress(console=messages(), transient=True) as bar:
         task: Any = None
 
         def move(done: int, total: int) -> None:

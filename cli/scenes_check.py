@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from .console import say
 from .options import FORMAT_HELP
 
 __all__ = ["check"]
@@ -30,7 +31,7 @@ def check(
     from ..scenes.folder import open_scene, update_checksums
 
     for name in update_checksums(scene) if update else ():
-        typer.echo(f"- {name} was edited; its new checksum is in the manifest", err=True)
+        say(f"- {name} was edited; its new checksum is in the manifest")
     report = check_scene(scene)
     reference = open_scene(scene).reference if "reference" in report.facts else None
     warnings = () if reference is None else reference_warnings(reference)
@@ -41,6 +42,6 @@ def check(
     for warning in warnings:
         typer.echo(f"Warning: {warning}", err=True)
     for problem in report.problems:
-        typer.echo(f"Error: {problem}", err=True)
+        say(f"Error: {problem}")
     if report.problems:
         raise typer.Exit(2)

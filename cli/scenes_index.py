@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .console import say
 from .options import QuietOption
 from .progress import import_progress
 
@@ -44,7 +45,7 @@ def index(
 def report_index(folder: Path, found: IndexedFolder) -> None:
     """Print what a folder of tiles holds and which files are left out of it; exit code 3 when there are any."""
     for problem in found.problems:
-        typer.echo(f"Error: {problem}", err=True)
+        say(f"Error: {problem}")
     typer.echo(f"{folder}: scene {found.scene.name!r} with {', '.join(found.scene.contents)}")
     if found.problems:
         raise typer.Exit(3)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from .console import messages
+from .console import messages, say
 
 if TYPE_CHECKING:
     from ..benchmark.execution.city import City, CityResult
@@ -42,20 +42,18 @@ def detect_tiles(
     if not options.quiet:
         _say(result, output, recipe.name)
     for problem in result.left_out:
-        typer.echo(f"left out: {problem}", err=True)
+        say(f"left out: {problem}")
     if result.failed:
         for tile, reason in result.failed.items():
-            typer.echo(f"failed: tile {tile.label}: {reason}", err=True)
-        typer.echo(
+            say(f"failed: tile {tile.label}: {reason}")
+        say(
             f"{len(result.failed)} of {result.tiles} tiles failed and are missing in {output}: repair their files, and "
             "give the same command with --overwrite, which computes these tiles alone",
-            err=True,
         )
     if result.left_out:
-        typer.echo(
+        say(
             f"{len(result.left_out)} files are no part of the scene: repair them, index it again, and repeat the "
             "command with --overwrite, which computes the tiles that they change",
-            err=True,
         )
     if result.failed or result.left_out:
         raise typer.Exit(3)
@@ -64,20 +62,19 @@ def detect_tiles(
 def _say(result: CityResult, output: Path, name: str) -> None:
     values = ", ".join(f"{key}={value:g}" for key, value in result.measured.parameters.items())
     if values:
-        typer.echo(f"note: {name}: all tiles share {values}, measured on up to five of them", err=True)
+        say(f"note: {name}: all tiles share {values}, measured on up to five of them")
     seams = result.seams
     if any(seams):
-        typer.echo(
+        say(
             f"note: {name}: at the seams {seams.doubles} double and {seams.cut} cut footprints were left out, "
             f"{seams.joined} cut ones joined, {seams.added} added that only the neighbouring tile found",
-            err=True,
         )
     if result.skipped:
         first, reason = next(iter(result.skipped.items()))
-        typer.echo(f"note: {len(result.skipped)} tiles were skipped, the first at {first.label}: {reason}", err=True)
+        say(f"note: {len(result.skipped)} tiles were skipped, the first at {first.label}: {reason}")
     reused = f", {result.reused} of them finished before" if result.reused else ""
     memory = f", at most {result.peak_memory / 1e6:.0f} MB in a worker" if result.peak_memory else ""
-    typer.echo(f"{output}: {result.footprints} footprints of {result.tiles} tiles{reused}{memory}", err=True)
+    say(f"{output}: {result.footprints} footprints of {result.tiles} tiles{reused}{memory}")
 
 
 @contextmanager

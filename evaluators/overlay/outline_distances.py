@@ -20,6 +20,9 @@ __all__ = ["PairDistances", "corner_distances", "pair_distances", "polis_distanc
 
 _CHUNK = 1 << 16
 
+#: Vertices of an outline from which on distances from it are found by an index, and those of a piece in it.
+_LONG, _PIECE = 2000, 32
+
 #: From so many pairs of general outlines on, or of any, distances are computed by compiled code, which takes a moment
 #: to load.
 _MANY_OUTLINES, _MANY_PAIRS = 10_000, 50_000
@@ -54,9 +57,7 @@ def pair_distances(
     ]
     both = (rows[0] >= 0) & (rows[1] >= 0)
     if len(both) > _MANY_PAIRS or np.count_nonzero(~both) > _MANY_OUTLINES:
-        from .vertex_distances import ring_distances  # compiled code: a comparison of small files does without
-
-        return PairDistances(*ring_distances(detected.rings, reference.rings, *pairs, both))
+        return _many_distances(detected, reference, pairs, both)
     corners = [footprints.quadrilaterals[1] for footprints in (detected, reference)]
     polis = np.empty(len(pairs[0]))
     outline = np.empty(len(pairs[0]))
@@ -71,6 +72,28 @@ def pair_distances(
         few = general[start : start + _CHUNK]
         polis[few] = polis_distances(detected.polygons[pairs[0][few]], reference.polygons[pairs[1][few]])
     outline[general] = polis[general]
+    return PairDistances(outline, both, polis)
+
+
+def _many_distances(
+    detected: Footprints,
+    reference: Footprints,
+    pairs: tuple[NDArray[np.int64], NDArray[np.int64]],
+    both: NDArray[np.bool_],
+) -> PairDistances:
+    """Measure many matched pairs; `both` is whether both outlines are convex quadrilaterals."""
+    from .vertex_distances import ring_distances  # compiled code: a comparison of small files does without
+
+    starts = detected.rings[0], reference.rings[0]
+    sizes = [np.diff(start)[members] for start, members in zip(starts, pairs, strict=True)]
+    # Compiled, the time of a pair is the product of the numbers of vertices.
+    long = np.maximum(*sizes) > _LONG
+    if not long.any():
+        return PairDistances(*ring_distances(detected.rings, reference.rings, *pairs, both))
+    outline, polis = np.empty(len(both)), np.empty(len(both))
+    first, second = (members[~long] for members in pairs)
+    outline[~long], _, polis[~long] = ring_distances(detected.rings, reference.rings, first, second, both[~long])
+    outline[long] = polis[long] = polis_distances(detected.polygons[pairs[0][long]], reference.polygons[pairs[1][long]])
     return PairDistances(outline, both, polis)
 
 
@@ -113,10 +136,37 @@ def _one_way(first: NDArray[np.object_], second: NDArray[np.object_]) -> NDArray
     coordinates, vertex_ring = shapely.get_coordinates(rings, return_index=True)
     closing = np.append(vertex_ring[1:] != vertex_ring[:-1], True)[: len(vertex_ring)]
     owner = part_of[ring_of[vertex_ring[~closing]]]
-    distances = shapely.distance(shapely.points(coordinates[~closing]), shapely.boundary(second)[owner])
+    vertices, boundaries = coordinates[~closing], shapely.boundary(second)
+    long = shapely.get_num_coordinates(boundaries) > _LONG
+    distances = np.empty(len(vertices))
+    short = ~long[owner]
+    distances[short] = shapely.distance(shapely.points(vertices[short]), boundaries[owner[short]])
+    for row in np.flatnonzero(long):
+        own = np.flatnonzero(owner == row)
+        distances[own] = _distances_from_long(vertices[own], boundaries[row])
     count = np.bincount(owner, minlength=len(first))
     means: NDArray[np.float64] = np.bincount(owner, weights=distances, minlength=len(first)) / np.maximum(count, 1)
     return means
+
+
+def _distances_from_long(points: NDArray[np.float64], boundary: shapely.Geometry) -> NDArray[np.float64]:
+    """Return the distance of each point, shape (n, 2), from a long line; only its pieces nearby are measured."""
+    pieces: list[NDArray[np.object_]] = []
+    for line in shapely.get_parts(boundary):
+        xy = shapely.get_coordinates(line)
+        step = _PIECE - 1
+        whole = (len(xy) - 1) // step
+        cuts = np.arange(whole)[:, None] * step + np.arange(_PIECE)
+        pieces.append(shapely.linestrings(xy[cuts]))
+        if whole * step < len(xy) - 1:
+            pieces.append(np.array([shapely.LineString(xy[whole * step :])]))
+    tree = shapely.STRtree(np.concatenate(pieces))
+    distances = np.empty(len(points))
+    for start in range(0, len(points), _CHUNK):
+        part = shapely.points(points[start : start + _CHUNK])
+        (asked, _), distances_of_asked = tree.query_nearest(part, return_distance=True, all_matches=False)
+        distances[start + asked] = distances_of_asked
+    return distances
 
 
 def _vertices_to_edges(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:

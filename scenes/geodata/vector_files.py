@@ -246,6 +246,8 @@ def readable_layer(file: Path, layer: str | None) -> Iterator[tuple[Path, str]]:
     with plain_path(file) as path:
         try:
             names = layer_names(path)
+            if not names:
+                raise InputError(f"{file} has no layers: give a file with polygons")
             if layer is None and len(names) > 1:
                 raise InputError(
                     f"{file} has {len(names)} layers ({', '.join(names)}): name one as '{file}|layername={names[0]}'"

@@ -1,11 +1,8 @@
 """Folders and files without permission, links, archives that unpack to gigabytes, names that are markup."""
 
 import json
-import os
 import shutil
-import sys
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +12,7 @@ from rasterio import Affine
 
 import roofbench as rb
 from hostile.checks import check, content
-from roofbench.core.package import FOLDER
 
-#: A user without rights: that of ``nobody``.
-NOBODY = 65534
 #: Where each kind of file is read.
 READERS = {
     "houses.geojson": ("evaluate", "houses.geojson", "truth.geojson"),
@@ -37,7 +31,7 @@ READERS = {
 WRITERS = {
     "verdicts": ("evaluate", "houses.gpkg", "truth.geojson", "--verdicts", "PLACE/out.gpkg"),
     "plot": ("evaluate", "houses.gpkg", "truth.geojson", "--plot", "PLACE/out.png"),
-    "parts": ("evaluate", "houses.gpkg", "truth.geojson", "--parts", "3", "--verdicts", "PLACE/out.gpkg"),
+    "parts": ("evaluate", "houses.gpkg", "houses.fgb", "--parts", "3", "--verdicts", "PLACE/out.gpkg"),
     "import": ("scenes", "import", "points.laz", "ortho.tif", "-q", "-o", "PLACE/out"),
     "make": ("scenes", "make", "fairfield-3-small", "--seed", "1", "-o", "PLACE/out"),
     "detect": ("detect", "ndsm", "scene", "-o", "PLACE/out.gpkg"),
@@ -55,29 +49,25 @@ def laid_out(sound_files, tmp_path):
 
 
 @pytest.fixture
-def nobody(sandbox, laid_out):
-    """Return how to run a command as a user without rights to anything but what is readable for all."""
-    user = None
-    if os.geteuid() == 0:  # root may read and write everything
-        user = NOBODY
-        for place in (laid_out, *laid_out.parents):
-            if place.stat().st_uid == 0 and place.is_relative_to("/tmp") and place != Path("/tmp"):
-                place.chmod(0o755)
-        readable = sandbox.run("list", "evaluators", folder=laid_out, user=user)
-        if readable.code:
-            pytest.skip(f"another user cannot read {FOLDER} or {sys.prefix}")
+def bound(sandbox, laid_out):
+    """Return how to run a command that permissions bind, root or not."""
+    (laid_out / "secret").touch(mode=0o000)
+    if "No such" in (answer := sandbox.run("ls", "--store", "secret", folder=laid_out, plain=True)).stderr:
+        pytest.skip("capabilities cannot be given up here")
+    assert answer.code == 2, answer.stderr
+    (laid_out / "secret").unlink()
 
     def run(*words, seconds=20.0):
-        return sandbox.run(*words, folder=laid_out, user=user, seconds=seconds)
+        return sandbox.run(*words, folder=laid_out, plain=True, seconds=seconds)
 
     return run
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_what_may_not_be_read_is_one_sentence(name, nobody, laid_out):
+def test_what_may_not_be_read_is_one_sentence(name, bound, laid_out):
     before = content(laid_out)
     (laid_out / name).chmod(0o000)
-    outcome = nobody(*READERS[name])
+    outcome = bound(*READERS[name])
     (laid_out / name).chmod(0o755)
     check(outcome, before, laid_out)
     assert outcome.code == 2, outcome.stderr
@@ -85,28 +75,30 @@ def test_what_may_not_be_read_is_one_sentence(name, nobody, laid_out):
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_a_folder_that_may_not_be_written_is_one_sentence(name, nobody, laid_out):
+def test_a_folder_that_may_not_be_written_is_one_sentence(name, bound, laid_out):
     place = laid_out / "place"
     place.mkdir(mode=0o755)
     place.chmod(0o555)
-    outcome = nobody(*(word.replace("PLACE", "place") for word in WRITERS[name]))
+    outcome = bound(*(word.replace("PLACE", "place") for word in WRITERS[name]))
     assert outcome.code == 2, outcome.stderr
     assert "Traceback" not in outcome.stderr
     assert not list(place.iterdir())
 
 
-def test_a_store_in_a_folder_that_may_not_be_written_can_be_read(nobody, laid_out):
+def test_a_store_in_a_folder_that_may_not_be_written_can_be_read(bound, laid_out):
     place = laid_out / "place"
     place.mkdir()
     shutil.copy(laid_out / "runs.sqlite", place)
     (place / "runs.sqlite").chmod(0o444)
     place.chmod(0o555)
-    outcome = nobody("ls", "--format", "json", "--store", "place/runs.sqlite")
+    outcome = bound("ls", "--format", "json", "--store", "place/runs.sqlite")
     assert outcome.code == 0, outcome.stderr
     assert len(json.loads(outcome.stdout)) >= 1
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize(
+    "name", [name for name in WRITERS if name != "run"]
+)  # a store may be a link: it is read and written in place
 def test_nothing_is_written_through_a_link(name, sandbox, laid_out):
     """A link where the output is to appear is no way to another place."""
     other = laid_out / "other"
@@ -243,6 +235,6 @@ def test_outlines_of_many_vertices_end_in_bounds(sandbox, tmp_path):
     for name in ("one.fgb", "two.gpkg"):
         rb.write_footprints(shape, tmp_path / name)
     before = content(tmp_path)
-    outcome = sandbox.run("evaluate", "one.fgb", "two.gpkg", "--format", "json", folder=tmp_path, seconds=of(20, 300))
+    outcome = sandbox.run("evaluate", "one.fgb", "two.gpkg", "--format", "json", folder=tmp_path, seconds=of(20, 600))
     check(outcome, before, tmp_path, memory=of(1 << 30, 6 << 30))
     assert json.loads(outcome.stdout)["counts"]["true_positives"] == 1

@@ -63,3 +63,21 @@ def test_many_polygons_are_checked_as_few_are(monkeypatch):
     polygons = [*stars(3, 30, 9).polygons, shapely.box(0, 0, 1, 1), bow_tie, dart, flat, shapely.box(3, 0, 2, 1)]
     found = Footprints.of(polygons)
     assert [repair.id for repair in found.repairs] == np.flatnonzero(~shapely.is_valid(polygons)).tolist() == [31]
+
+
+@pytest.mark.parametrize("many", [False, True], ids=["few", "many"])
+def test_long_outlines_have_the_same_distances_by_an_index(monkeypatch, many):
+    """Without it the time of a pair is the product of the numbers of vertices: hours for a million on each side."""
+    ring = shapely.box(0, 0, 10, 10) - shapely.box(2, 3, 5, 8)
+    parts = shapely.union_all([shapely.box(0, 0, 3, 3), shapely.box(5, 5, 9, 9) - shapely.box(6, 6, 7, 7)])
+    one = Footprints.of([*stars(3, 30, 9).polygons, shapely.segmentize(ring, 0.1), shapely.segmentize(parts, 0.3)])
+    two = Footprints.of([*stars(4, 30, 120).polygons, parts, shapely.segmentize(ring, 0.01)])
+    pairs = np.arange(32), np.arange(32)
+    plain = pair_distances(one, two, pairs)
+    monkeypatch.setattr("roofbench.evaluators.overlay.outline_distances._LONG", 100)
+    monkeypatch.setattr("roofbench.evaluators.overlay.outline_distances._CHUNK", 64)
+    if many:
+        monkeypatch.setattr("roofbench.evaluators.overlay.outline_distances._MANY_OUTLINES", 1)
+    indexed = pair_distances(one, two, pairs)
+    np.testing.assert_allclose(indexed.polis, plain.polis, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(indexed.outline, plain.outline, rtol=0, atol=1e-12)
