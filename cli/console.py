@@ -39,9 +39,15 @@ def table_console() -> Console:
 
 def _console(**options: Any) -> Console:
     from rich.console import Console
+    from rich.text import Text
+
+    def cleaned(item: Any) -> Any:
+        if isinstance(item, Text):
+            item.plain = printable(item.plain)
+        return printable(item) if isinstance(item, str) else item
 
     class Printable(Console):
         def print(self, *objects: Any, **more: Any) -> None:
-            super().print(*(printable(item) if isinstance(item, str) else item for item in objects), **more)
+            super().print(*map(cleaned, objects), **more)
 
     return Printable(highlight=False, **options)

@@ -40,7 +40,7 @@ def check(
     else:
         typer.echo(format_facts(report.facts), nl=False)
     for warning in warnings:
-        typer.echo(f"Warning: {warning}", err=True)
+        say(f"Warning: {warning}")
     for problem in report.problems:
         say(f"Error: {problem}")
     if report.problems:
