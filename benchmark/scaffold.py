@@ -79,6 +79,9 @@ def _files(template: Template, name: str) -> Iterator[tuple[Path, str]]:
     words = _words(name)
     for file, text in _sources(template):
         target = Path(_filled(file, words))
+        if target.name == "gitignore":
+            # Patterns of package data leave out names that begin with a dot.
+            target = Path(".gitignore")
         place = _FOLDERS.get(target.name.partition("-")[0])
         yield (target if place is None else place / target.name.partition("-")[2]), _filled(text, words)
     if template == "plugin-package":

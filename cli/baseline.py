@@ -58,6 +58,7 @@ def save(
     from ..benchmark.identity.provenance import code_version
     from ..benchmark.suite import suite_of_words
     from ..core.output import check_target
+    from ..reports.format import counted
 
     check_target(output, overwrite)
     version = code_version()
@@ -74,8 +75,7 @@ def save(
     console = messages(options.quiet)
     measured, failed = measure_suite(chosen, options, console)
     measured.save(output, overwrite=overwrite)
-    console.print(
-        f"{output}: {len(measured.detectors)} detectors on {len(measured.scenes)} scenes, {version}", markup=False
-    )
+    detectors, places = counted(len(measured.detectors), "detector"), counted(len(measured.scenes), "scene")
+    console.print(f"{output}: {detectors} on {places}, {version}", markup=False)
     if failed:
         raise typer.Exit(3)

@@ -18,6 +18,7 @@ from ...core.errors import InputError, ParameterError, UnknownNameError
 from ...core.output import whole_file
 from ...core.package import BENCHMARK_VERSION
 from ...core.registry import nearest_hint
+from ...detectors.base import Detector
 from ...detectors.registry import make_detector
 from ...evaluators.base import Evaluator
 from ..identity.detector_code import DetectorCode
@@ -54,12 +55,21 @@ class Measured:
         Index values by key (None where undefined); None for a run that failed or was skipped.
     code : DetectorCode, optional
         The code that ran; None in baselines of version 0.1.
+    chosen : tuple of str, optional
+        The parameters that differed from their defaults. None in older baselines, which repeat every value.
     """
 
     recipe: PluginRecipe
     seeds: tuple[int, ...]
     runs: Mapping[tuple[str, int], Mapping[str, float | None] | None]
     code: DetectorCode | None = None
+    chosen: tuple[str, ...] | None = None
+
+    def installed(self) -> Detector:
+        """Return the detector as it is installed now: a changed default is a change that the gate measures."""
+        if self.chosen is None:
+            return self.recipe.detector()
+        return replace(self.recipe, parameters={name: self.recipe.parameters[name] for name in self.chosen}).detector()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +100,7 @@ class Baseline:
 
     def to_suite(self) -> Suite:
         """Return the suite that repeats it."""
-        detectors = tuple(DetectorEntry(found.recipe.detector(), found.seeds) for found in self.detectors.values())
+        detectors = tuple(DetectorEntry(found.installed(), found.seeds) for found in self.detectors.values())
         scenes = tuple(scene.recipe for scene in self.scenes.values())
         return Suite(self.suite, scenes, detectors, (self.evaluator.evaluator(),))
 
@@ -185,6 +195,8 @@ class Baseline:
                 for (scene, seed), values in sorted(measured.runs.items())
             ]
             facts = {**measured.recipe.to_dict(), "seeds": list(measured.seeds)}
+            if measured.chosen is not None:
+                facts["chosen"] = list(measured.chosen)
             if measured.code is not None:
                 facts["code"] = measured.code.to_dict()
             body = [f"      {json.dumps(name)}: {json.dumps(value)}," for name, value in facts.items()]
@@ -234,6 +246,7 @@ class Baseline:
                 tuple(values["seeds"]),
                 {(scene, seed): found for scene, seed, found in values["runs"]},
                 DetectorCode.from_dict(values["code"]) if "code" in values else None,
+                tuple(values["chosen"]) if "chosen" in values else None,
             )
             for label, values in content["detectors"].items()
         }
@@ -268,7 +281,8 @@ def measure(
                 found = values.get(row.id)
                 runs[row.scene, row.seed] = None if found is None else _rounded(found, keyed.evaluator)
         recipe = PluginRecipe.of(entry.detector).relative_to(Path.cwd())
-        detectors[entry.label] = Measured(recipe, entry.seeds, runs, DetectorCode.of(entry.detector))
+        chosen = tuple(entry.detector.changed())
+        detectors[entry.label] = Measured(recipe, entry.seeds, runs, DetectorCode.of(entry.detector), chosen)
     return Baseline(
         suite=suite.name,
         version=version,

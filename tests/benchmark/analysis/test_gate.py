@@ -1,5 +1,8 @@
 import csv
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import roofbench as rb
 from roofbench.benchmark.analysis.baseline import Baseline, BaselineScene, Measured
 from roofbench.benchmark.analysis.gate import compare, different_scenes, margins_of
 from roofbench.benchmark.identity import provenance
@@ -258,6 +262,22 @@ def test_the_command_line_exits_0_1_and_4(cli, misbehaving, tmp_path):
     other = cli("gate", "b.json", "few.json")
     assert other.exit_code == 4
     assert "Not comparable: scene hamlet-6 is only in the baseline" in other.stderr
+
+
+def test_a_changed_default_is_a_change_that_the_gate_measures(cli, misbehaving, tmp_path):
+    plugin = tmp_path / "shifting.py"
+    text = Path(misbehaving.rpartition(":")[0]).read_text()
+    before, after = "side: float = rb.parameter(8.0", "side: float = rb.parameter(7.0"
+    assert text.count(before) == 1
+    plugin.write_text(text)
+    (tmp_path / "little.toml").write_text(suite_text(f"{plugin}:Misbehaving", 10))
+    assert cli("baseline", "save", "-o", "b.json", "--suite", "little.toml", "-j", 0).exit_code == 0
+    plugin.write_text(text.replace(before, after))
+    # In another process: this one has imported the file already.
+    environment = {**os.environ, "PYTHONPATH": str(Path(rb.__file__).parents[1])}
+    gate = [sys.executable, "-m", "roofbench", "gate", "b.json", "-j", "0"]
+    changed = subprocess.run(gate, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert changed.returncode == 1, changed.stdout + changed.stderr
 
 
 def test_the_self_test_prints_how_often_identical_code_is_called_worse(cli, misbehaving, tmp_path):
