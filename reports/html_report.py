@@ -83,7 +83,10 @@ def html_report(report: Report, *, level: float = 0.8) -> str:
         subscripted=_subscripted,
         lead=_lead(report),
         tiles=_tiles(report),
-        boards=[_board(board) for board in report.boards],
+        boards=[
+            *(_board(part, title=part.title) for part in report.parts),
+            *(_board(board, title="All scenes" if report.parts else "") for board in report.boards),
+        ],
         scene_groups=_scene_groups(report),
         matrix=_matrix(report),
         charts=_charts(report, level),
@@ -129,14 +132,15 @@ def _lead(report: Report) -> str:
     """Return the result in one or two sentences."""
     if not report.boards:
         return "Nothing was measured."
-    board = report.boards[0]
-    entries = _pooled(board)
-    ranked = [entry for entry in entries if entry.rank is not None]
+    board = next((board for board in (*report.parts, report.boards[0]) if _ranked(board)), report.boards[0])
+    ranked = _ranked(board)
     if not ranked:
-        return f"{len(entries)} detectors, none of which has a result on every scene: nothing is ranked."
+        several = f"{len(_pooled(board))} detectors, none of which has a result on every scene: nothing is ranked."
+        return several if len(_pooled(board)) > 1 else "The detector has no result on every scene: it is not ranked."
     best, index = ranked[0], board.rank_by
     cell = best.cells[index.key]
-    text = f"{_short(best.label)} leads with {value_text(cell.value, index.unit, undefined='no')} {index.title}"
+    where = "" if board is report.boards[0] else f"{board.title}: "
+    text = f"{where}{_short(best.label)} leads with {value_text(cell.value, index.unit, undefined='no')} {index.title}"
     if cell.low is not None:
         text += f" (95 % interval {interval_text(cell.low, cell.high, index.unit)})"
     text += f" over {counted(len(board.scenes), 'scene')} and {best.reference:,} reference footprints"
@@ -179,7 +183,11 @@ def _pooled(board: Leaderboard) -> list[Entry]:
     return [entry for entry in board.entries if entry.pooling == "pooled"]
 
 
-def _board(board: Leaderboard) -> dict[str, Any]:
+def _ranked(board: Leaderboard) -> list[Entry]:
+    return [entry for entry in _pooled(board) if entry.rank is not None]
+
+
+def _board(board: Leaderboard, *, title: str = "") -> dict[str, Any]:
     """Return a leaderboard in the form of the template."""
     grouped = any(entry.group for entry in board.entries)
     # The summary stands first, so that a phone shows the score; the other indices are shown on request.
@@ -230,7 +238,7 @@ def _board(board: Leaderboard) -> dict[str, Any]:
         for entry in board.entries
     ]
     return {
-        "evaluator": board.evaluator,
+        "evaluator": f"{title}: {board.evaluator}" if title else board.evaluator,
         "leading": 2 + grouped,
         "hidden": len(indices) - shown,
         "grouped": grouped,

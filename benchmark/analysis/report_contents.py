@@ -24,6 +24,7 @@ from .report_data import CostPoint, Provenance, Report, Sensitivity
 from .report_scenes import draw_scenes
 from .results import GateResult, Leaderboard
 from .sensitivity import stored_sensitivities
+from .suite_parts import suite_parts
 from .versions import comparable_runs, version_names
 
 __all__ = ["fill_report", "newest_runs", "stored_evaluators"]
@@ -101,10 +102,16 @@ def fill_report(
     """
     every = rows
     rows, _ = comparable_runs(rows)
+    parts: list[Leaderboard] = []
     if evaluated is None:
         evaluated = [
             (keyed, make_leaderboard(every, store, keyed, title=title, rank_by=rank_by if place == 0 else None))
             for place, keyed in enumerate(stored_evaluators(store, rows))
+        ]
+        parts = [
+            make_leaderboard(part.rows, store, keyed, title=part.title, rank_by=rank_by)
+            for keyed, _ in evaluated[:1]
+            for part in suite_parts(rows, store.plans())
         ]
     if not rows or not evaluated:
         raise InputError(f"{store.path} holds no evaluated run to report: 'roofbench run' makes some")
@@ -120,6 +127,7 @@ def fill_report(
     return Report(
         title=title,
         boards=tuple(board for _, board in evaluated),
+        parts=tuple(part for part in parts if any(entry.rank for entry in part.entries)),
         matrix=board.by_scene,
         scenes=() if drawn is None else drawn.scenes,
         errors=() if drawn is None else drawn.errors,

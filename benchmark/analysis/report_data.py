@@ -197,7 +197,10 @@ class Report:
     ----------
     title : str
     boards : tuple of Leaderboard
-        One per evaluator; the first one's verdicts are drawn.
+        One per evaluator, over all scenes; the first one's verdicts are drawn.
+    parts : tuple of Leaderboard
+        By the first evaluator: the suites of the store, and the scenes that all detectors ran on, where not every
+        detector ran on every scene.
     matrix : mapping of str to mapping of str to float or None
         Scene to detector to the value of the first board's ranking index (mean over seeds).
     scenes : tuple of SceneView
@@ -218,6 +221,7 @@ class Report:
     title: str
     boards: tuple[Leaderboard, ...]
     provenance: Provenance
+    parts: tuple[Leaderboard, ...] = ()
     matrix: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
     scenes: tuple[SceneView, ...] = ()
     errors: tuple[Error, ...] = ()

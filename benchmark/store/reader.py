@@ -45,6 +45,10 @@ class StoreReader:
         content: Mapping[str, Any] = json.loads(row["content"])
         return content
 
+    def plans(self) -> list[Mapping[str, Any]]:
+        """Return the contents of all plans, the one that was run last first."""
+        return [json.loads(row["content"]) for row in self._db.execute("SELECT content FROM plans ORDER BY id DESC")]
+
     def statuses(self, keys: Iterable[str]) -> dict[str, tuple[int, Status, str]]:
         """Return (run id, status, reason) of those keys that are stored."""
         found = {}
