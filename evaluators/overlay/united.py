@@ -7,7 +7,8 @@ member
 group
     Members whose union is measured.
 slab
-    The plane between two successive heights y at which an edge of the group begins, ends or crosses another one.
+    The plane between two successive heights at which an edge of the group begins, ends or crosses another one. Heights
+    are along the longer side of the group's bounds: y, or x with both axes exchanged.
     Edges do not cross inside a slab, so what a group covers of it are trapezoids: the length that is covered in the
     middle of the slab, times its height, is their area.
 
@@ -35,6 +36,8 @@ __all__ = ["united_areas"]
 _CHUNK = 512
 #: Most crossings for each edge of a group; with more of them the slabs cost more than an overlay.
 _MOST_CROSSINGS = 24
+#: Edges that begin in a slab, beyond which its edges are sorted anew.
+_MANY_NEW = 16
 
 
 def united_areas(one: Outlines, two: Outlines, members: Members, *, threads: int | None = None) -> NDArray[np.float64]:
@@ -81,19 +84,26 @@ def _fill(one: Outlines, two: Outlines, members: Members, begin: int, areas: NDA
                 most += two.start[members.two[m] + 1] - two.start[members.two[m]]
         # An edge: lower end x, y, upper end x, y, and twice the member's number, plus 1 for the second polygon.
         edges = np.empty((most, 5))
-        x, y = np.inf, np.inf
+        x, y, right, top = np.inf, np.inf, -np.inf, -np.inf
         for m in range(low, high):
-            x, y = min(x, one.bounds[members.one[m], 0]), min(y, one.bounds[members.one[m], 1])
-            if members.two[m] >= 0:
-                x, y = min(x, two.bounds[members.two[m], 0]), min(y, two.bounds[members.two[m], 1])
+            row = members.one[m]
+            x, y = min(x, one.bounds[row, 0]), min(y, one.bounds[row, 1])
+            right, top = max(right, one.bounds[row, 2]), max(top, one.bounds[row, 3])
+            row = members.two[m]
+            if row >= 0:
+                x, y = min(x, two.bounds[row, 0]), min(y, two.bounds[row, 1])
+                right, top = max(right, two.bounds[row, 2]), max(top, two.bounds[row, 3])
+        # Slabs across the longer side of the group have few edges each.
+        axis = 1 if right - x > top - y else 0
+        frame = (x, y, 0) if axis == 0 else (y, x, 1)
         count = 0
         for m in range(low, high):
             row = members.one[m]
-            count = _gather(one.points, one.start[row], one.start[row + 1], x, y, 2.0 * (m - low), edges, count)
+            count = _gather(one.points, one.start[row], one.start[row + 1], frame, 2.0 * (m - low), edges, count)
             row = members.two[m]
             if row >= 0:
                 label = 2.0 * (m - low) + 1.0
-                count = _gather(two.points, two.start[row], two.start[row + 1], x, y, label, edges, count)
+                count = _gather(two.points, two.start[row], two.start[row + 1], frame, label, edges, count)
         areas[place] = _covered(edges[:count], members.two[low:high])
 
 
@@ -102,16 +112,16 @@ def _gather(
     points: NDArray[np.float64],
     begin: int,
     end: int,
-    x: float,
-    y: float,
+    frame: tuple[float, float, int],
     label: float,
     edges: NDArray[np.float64],
     count: int,
 ) -> int:
-    """Append the edges of an outline; return how many edges there are now."""
+    """Append the edges of an outline, seen from the origin of a frame and its first axis; return how many there are."""
+    x, y, axis = frame
     for k in range(begin, end - 1):
-        ax, ay = points[k, 0] - x, points[k, 1] - y
-        bx, by = points[k + 1, 0] - x, points[k + 1, 1] - y
+        ax, ay = points[k, axis] - x, points[k, 1 - axis] - y
+        bx, by = points[k + 1, axis] - x, points[k + 1, 1 - axis] - y
         if ay == by or ay != ay or by != by:
             continue  # level, or beside the NaN between two rings
         if ay > by:
@@ -181,7 +191,13 @@ def _covered(edges: NDArray[np.float64], second: NDArray[np.int64]) -> float:
         for i in range(passing):
             e = active[i]
             share = (middle - edges[e, 1]) / (edges[e, 3] - edges[e, 1])
-            x = edges[e, 0] + share * (edges[e, 2] - edges[e, 0])
+            along[i] = edges[e, 0] + share * (edges[e, 2] - edges[e, 0])
+        # Edges that go on are in order already; many new ones are sorted, few are inserted.
+        if passing - kept > _MANY_NEW:
+            order = np.argsort(along[:passing])
+            along[:passing], active[:passing] = along[order], active[order]
+        for i in range(passing):
+            e, x = active[i], along[i]
             place = i
             while place > 0 and along[place - 1] > x:
                 along[place], active[place] = along[place - 1], active[place - 1]

@@ -349,7 +349,9 @@ def building_column(file: Path, columns: Iterable[str], name: str | None) -> str
     """Return the column of building ids: the one that is named, or ``building_id`` where there is one."""
     known = list(columns)
     if name is None:
-        return "building_id" if "building_id" in known else None
+        # A Shapefile keeps ten letters of a name.
+        usual = ("building_id", "building_i") if file.suffix.lower() == ".shp" else ("building_id",)
+        return next((column for column in usual if column in known), None)
     if name not in known and file.suffix.lower() == ".shp" and name[:10] in known:
         name = name[:10]
     if name not in known:

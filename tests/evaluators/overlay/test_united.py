@@ -115,3 +115,14 @@ def test_groups_are_those_of_a_plain_search(links):
                     waiting += [other for link in links if here in link for other in link]
             expected.append(sorted(group))
     assert found == expected
+
+
+@pytest.mark.parametrize("along", [(5.0, 0.0), (0.0, 5.0), (4.0, 3.0)])
+def test_long_rows_of_houses_are_one_group(along):
+    count = 3000
+    houses = [shapely.box(0, 0.1 * (k % 7), 5.5, 6) for k in range(count)]
+    row = [shapely.affinity.translate(house, k * along[0], k * along[1]) for k, house in enumerate(houses)]
+    groups = Members(np.array([0, count]), np.arange(count), np.full(count, -1))
+    outlines = outlines_of(rb.Footprints.of(row))
+    found = united_areas(outlines, outlines, groups)
+    assert found[0] == pytest.approx(shapely.union_all(row).area, rel=1e-9)

@@ -55,3 +55,10 @@ def test_files_that_cannot_be_read_in_parts_are_refused(tmp_path):
     (tmp_path / "text.parquet").write_text("no parquet")
     with pytest.raises(InputError, match="cannot be read as GeoParquet"):
         open_stream(tmp_path / "text.parquet")
+
+
+def test_the_short_name_of_building_ids_in_a_shapefile_is_known(tmp_path):
+    houses = rb.Footprints.of([shapely.box(0, 0, 5, 9), shapely.box(5, 0, 9, 9)], building_ids=[4, 4], crs="EPSG:25832")
+    rb.write_footprints(houses, tmp_path / "side.shp")
+    ((_, labels),) = open_stream(tmp_path / "side.shp").outlines()
+    assert labels.to_pylist() == [4, 4]
