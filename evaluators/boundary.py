@@ -30,7 +30,7 @@ from .overlay.left_out import LeftOut, left_out_notes
 from .overlay.outline_distances import pair_distances
 from .overlay.reference_overlaps import input_notes
 from .overlay.turning import turning_distances
-from .tally import Histogram, Tallies, histogram
+from .tally import ADDED, Histogram, Tallies, histogram
 from .threshold_free.correspondence import MATCHINGS
 from .threshold_free.object_graph import ObjectGraph, object_graph
 from .verdict_table import Measure, Verdicts
@@ -85,7 +85,7 @@ class _Scene(Tallies):
 class _Tallies(Tallies):
     counts: _Counts = field(default_factory=_Counts)
     sums: _Sums = field(default_factory=_Sums)
-    corners: _Corners = field(default_factory=_Corners)
+    corners: _Corners = field(default_factory=_Corners, metadata=ADDED)
     scene: _Scene = field(default_factory=_Scene)
     left_out: LeftOut = field(default_factory=LeftOut)
     polis: Histogram = field(default_factory=_METRES)

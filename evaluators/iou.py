@@ -12,25 +12,22 @@ file changes nothing; with distinct confidences the value is COCO's.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from ..core.parameters import parameter
-from ..scenes.geodata.footprints import Footprints
-from ..scenes.geodata.raster import Grid
 from .average_precision import AP_THRESHOLDS, Ranking, average_precision
-from .base import Evaluation, Evaluator
+from .coverage_evaluator import CoverageEvaluator
 from .index import IndexGroup, index, ratio
-from .overlay.coverage import CountedSets, counted_sets
+from .overlay.coverage import CountedSets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
 from .overlay.greedy import accept_in_order
-from .overlay.left_out import Counted, LeftOut, left_out_notes
+from .overlay.left_out import Counted, LeftOut
 from .overlay.overlaps import overlaps_between
-from .overlay.reference_overlaps import input_notes
 from .tally import Tallies
 from .verdict_table import Measure, Verdicts
 
@@ -215,7 +212,7 @@ class _Candidates:
 
 
 @dataclass(frozen=True, kw_only=True)
-class IoU(Evaluator):
+class IoU(CoverageEvaluator):
     """Greedy matching by IoU: precision, recall, F1, AP, AR and panoptic quality (SpaceNet, COCO)."""
 
     name: ClassVar[str] = "iou"
@@ -239,20 +236,9 @@ class IoU(Evaluator):
         doc="coco: left-out references are ignore regions at the threshold; spacenet: by any overlap",
     )
     confidence: str = parameter("confidence", doc="attribute of the detections that ranks them, where they have it")
-    minimum_area: float = parameter(
-        0.0, unit="m2", minimum=0.0, doc="smaller references do not count, nor do detections on them"
-    )
 
-    def evaluate(
-        self,
-        detected: Footprints,
-        reference: Footprints,
-        *,
-        area: shapely.Geometry | None = None,
-        grid: Grid | None = None,
-    ) -> Evaluation:
-        """Compare two sets; see `Evaluator.evaluate`."""
-        sets = counted_sets(detected, reference, area=area, minimum_area=self.minimum_area)
+    def measured(self, sets: CountedSets) -> tuple[Tallies, Callable[[], Verdicts]]:
+        """Return the tallies of two sets, and how their verdicts are found."""
         if self.matching == "coco":
             sets = self._with_ignore_regions(sets)
         candidates = self._candidates(sets)
@@ -263,7 +249,7 @@ class IoU(Evaluator):
         for side, (mask, now) in enumerate(((d, of_detection), (r, of_reference))):
             changed = [(partners[side] >= 0) != (now >= 0) for partners in moved]
             flipped[side] = (np.logical_or(*changed) & mask).sum()
-        hits = np.zeros(len(detected), dtype=np.int64)
+        hits = np.zeros(len(sets.detected), dtype=np.int64)
         for place, threshold in enumerate(AP_THRESHOLDS.tolist()):
             hits |= (candidates.match(threshold)[0] >= 0).astype(np.int64) << place
         matched = int((of_detection >= 0).sum())
@@ -282,15 +268,7 @@ class IoU(Evaluator):
             left_out=sets.left_out,
             ranking=Ranking(candidates.scores[d], hits[d]),
         )
-        return self.summarise(
-            tallies,
-            list(input_notes(detected, reference)),
-            find_verdicts=lambda: self._verdicts(sets, candidates, of_detection, of_reference),
-        )
-
-    def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:
-        """Return how many objects were left out."""
-        return tuple(left_out_notes(tallies.left_out))
+        return tallies, lambda: self._verdicts(sets, candidates, of_detection, of_reference)
 
     def _with_ignore_regions(self, sets: CountedSets) -> CountedSets:
         """Leave out detections by their IoU with left-out references, instead of by any overlap with them."""

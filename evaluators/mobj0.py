@@ -6,21 +6,17 @@ A reference is *paired* when any detection overlaps it. Objects without a counte
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-import shapely
 
-from ..core.parameters import parameter
-from ..scenes.geodata.footprints import Footprints
-from ..scenes.geodata.raster import Grid
-from .base import Evaluation, Evaluator
+from .coverage_evaluator import CoverageEvaluator
 from .index import IndexGroup, index, ratio
-from .overlay.coverage import CountedSets, counted_sets
+from .overlay.coverage import CountedSets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import LeftOut, left_out_notes
-from .overlay.reference_overlaps import input_notes
+from .overlay.left_out import LeftOut
 from .tally import Tallies
 from .verdict_table import Measure, Verdicts
 
@@ -81,7 +77,7 @@ class Mobj0Indices(IndexGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mobj0(Evaluator):
+class Mobj0(CoverageEvaluator):
     """Objects with and without a counterpart (IGN, CoClico)."""
 
     name: ClassVar[str] = "mobj0"
@@ -95,20 +91,8 @@ class Mobj0(Evaluator):
     )
     measures = (Measure(key="touched", title="footprints on the other side", unit="count"),)
 
-    minimum_area: float = parameter(
-        0.0, unit="m2", minimum=0.0, doc="smaller references do not count, nor do detections that overlap only them"
-    )
-
-    def evaluate(
-        self,
-        detected: Footprints,
-        reference: Footprints,
-        *,
-        area: shapely.Geometry | None = None,
-        grid: Grid | None = None,
-    ) -> Evaluation:
-        """Compare two sets; see `Evaluator.evaluate`."""
-        sets = counted_sets(detected, reference, area=area, minimum_area=self.minimum_area)
+    def measured(self, sets: CountedSets) -> tuple[Tallies, Callable[[], Verdicts]]:
+        """Return the tallies of two sets, and how their verdicts are found."""
         paired = sets.references.mask & (sets.of_references.touched > 0)
         supported = sets.detections.mask & (sets.of_detections.touched > 0)
         counts = _Counts(
@@ -118,15 +102,7 @@ class Mobj0(Evaluator):
             false_negatives=int((sets.references.mask & ~paired).sum()),
             false_positives=int((sets.detections.mask & ~supported).sum()),
         )
-        return self.summarise(
-            _Tallies(counts=counts, left_out=sets.left_out),
-            list(input_notes(detected, reference)),
-            find_verdicts=lambda: self._verdicts(sets),
-        )
-
-    def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:
-        """Return how many objects were left out."""
-        return tuple(left_out_notes(tallies.left_out))
+        return _Tallies(counts=counts, left_out=sets.left_out), lambda: self._verdicts(sets)
 
     def _verdicts(self, sets: CountedSets) -> Verdicts:
         sides = [

@@ -15,20 +15,16 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..core.parameters import parameter
-from ..scenes.geodata.footprints import Footprints
-from ..scenes.geodata.raster import Grid
-from .base import Evaluation, Evaluator
+from .coverage_evaluator import CoverageEvaluator
 from .index import Curve, IndexGroup, index, ratio
-from .overlay.coverage import CountedSets, Coverage, counted_sets
+from .overlay.coverage import CountedSets, Coverage
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import LeftOut, left_out_notes
-from .overlay.reference_overlaps import input_notes
+from .overlay.left_out import LeftOut
 from .tally import Histogram, Tallies, histogram
 from .verdict_table import Measure, Verdicts
 
@@ -218,7 +214,7 @@ def _by_size(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rutzinger(Evaluator):
+class Rutzinger(CoverageEvaluator):
     """Threshold-based object evaluation (Rottensteiner et al. 2005, 2014; Rutzinger et al. 2009)."""
 
     name: ClassVar[str] = "rutzinger"
@@ -266,20 +262,9 @@ class Rutzinger(Evaluator):
     threshold: float = parameter(
         0.5, minimum=0.0, maximum=1.0, doc="share of an object's area that must be covered", source="2009 paper"
     )
-    minimum_area: float = parameter(
-        0.0, unit="m2", minimum=0.0, doc="smaller references do not count, nor do detections that overlap only them"
-    )
 
-    def evaluate(
-        self,
-        detected: Footprints,
-        reference: Footprints,
-        *,
-        area: shapely.Geometry | None = None,
-        grid: Grid | None = None,
-    ) -> Evaluation:
-        """Compare two sets; see `Evaluator.evaluate`."""
-        sets = counted_sets(detected, reference, area=area, minimum_area=self.minimum_area)
+    def measured(self, sets: CountedSets) -> tuple[Tallies, Callable[[], Verdicts]]:
+        """Return the tallies of two sets, and how their verdicts are found."""
         d, r = sets.detections.mask, sets.references.mask
         correct, found = (self._true(coverage) for coverage in (sets.of_detections, sets.of_references))
         no_sizes = _SIZES()
@@ -296,24 +281,18 @@ class Rutzinger(Evaluator):
             detection_classes=_Classes.of(sets.of_detections.share[d]),
             topology=_topology(sets),
             areas=_Areas(
-                detected=float(detected.areas[d].sum()),
-                detected_covered=float((detected.areas * sets.of_detections.share)[d].sum()),
-                reference=float(reference.areas[r].sum()),
-                reference_covered=float((reference.areas * sets.of_references.share)[r].sum()),
+                detected=float(sets.detected.areas[d].sum()),
+                detected_covered=float((sets.detected.areas * sets.of_detections.share)[d].sum()),
+                reference=float(sets.reference.areas[r].sum()),
+                reference_covered=float((sets.reference.areas * sets.of_references.share)[r].sum()),
             ),
             left_out=sets.left_out,
-            reference_sizes=no_sizes.filled(reference.areas[r]),
-            reference_sizes_found=no_sizes.filled(reference.areas[r & found]),
-            detection_sizes=no_sizes.filled(detected.areas[d]),
-            detection_sizes_correct=no_sizes.filled(detected.areas[d & correct]),
+            reference_sizes=no_sizes.filled(sets.reference.areas[r]),
+            reference_sizes_found=no_sizes.filled(sets.reference.areas[r & found]),
+            detection_sizes=no_sizes.filled(sets.detected.areas[d]),
+            detection_sizes_correct=no_sizes.filled(sets.detected.areas[d & correct]),
         )
-        return self.summarise(
-            tallies, list(input_notes(detected, reference)), find_verdicts=lambda: self._verdicts(sets)
-        )
-
-    def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:
-        """Return how many objects were left out."""
-        return tuple(left_out_notes(tallies.left_out))
+        return tallies, lambda: self._verdicts(sets)
 
     def _true(self, coverage: Coverage) -> NDArray[np.bool_]:
         # An object that nothing overlaps is no true positive, even at a threshold of 0.

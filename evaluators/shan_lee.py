@@ -16,18 +16,13 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-from ..core.parameters import parameter
-from ..scenes.geodata.footprints import Footprints
-from ..scenes.geodata.raster import Grid
-from .base import Evaluation, Evaluator
+from .coverage_evaluator import CoverageEvaluator
 from .index import Curve, IndexGroup, index, ratio
-from .overlay.coverage import CountedSets, counted_sets
+from .overlay.coverage import CountedSets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import LeftOut, left_out_notes
-from .overlay.reference_overlaps import input_notes
+from .overlay.left_out import LeftOut
 from .tally import Histogram, Tallies, histogram
 from .verdict_table import Measure, Verdicts
 
@@ -173,7 +168,7 @@ def building_values(sets: CountedSets) -> dict[str, NDArray[np.float64]]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShanLee(Evaluator):
+class ShanLee(CoverageEvaluator):
     """Histograms of how well each building is overlapped (Shan & Lee 2005)."""
 
     name: ClassVar[str] = "shan-lee"
@@ -201,20 +196,8 @@ class ShanLee(Evaluator):
         _histogram("crosslap", "count", "references that a detection touches; 10 and more in the last bin"),
     )
 
-    minimum_area: float = parameter(
-        0.0, unit="m2", minimum=0.0, doc="smaller references do not count, nor do detections that overlap only them"
-    )
-
-    def evaluate(
-        self,
-        detected: Footprints,
-        reference: Footprints,
-        *,
-        area: shapely.Geometry | None = None,
-        grid: Grid | None = None,
-    ) -> Evaluation:
-        """Compare two sets; see `Evaluator.evaluate`."""
-        sets = counted_sets(detected, reference, area=area, minimum_area=self.minimum_area)
+    def measured(self, sets: CountedSets) -> tuple[Tallies, Callable[[], Verdicts]]:
+        """Return the tallies of two sets, and how their verdicts are found."""
         d, r = sets.detections.mask, sets.references.mask
         values = {name: column[r] for name, column in building_values(sets).items()}
         crosslap = sets.of_detections.touched[d]
@@ -232,13 +215,7 @@ class ShanLee(Evaluator):
             crosslap=empty.crosslap.filled(crosslap),
             **{name: getattr(empty, name).filled(column) for name, column in values.items()},
         )
-        return self.summarise(
-            tallies, list(input_notes(detected, reference)), find_verdicts=lambda: self._verdicts(sets)
-        )
-
-    def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:
-        """Return how many objects were left out."""
-        return tuple(left_out_notes(tallies.left_out))
+        return tallies, lambda: self._verdicts(sets)
 
     def _verdicts(self, sets: CountedSets) -> Verdicts:
         values = building_values(sets)

@@ -12,18 +12,13 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-from ..core.parameters import parameter
-from ..scenes.geodata.footprints import Footprints
-from ..scenes.geodata.raster import Grid
-from .base import Evaluation, Evaluator
+from .coverage_evaluator import CoverageEvaluator
 from .index import Curve, IndexGroup, index, ratio
-from .overlay.coverage import CountedSets, Coverage, counted_sets
+from .overlay.coverage import CountedSets, Coverage
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import Counted, LeftOut, left_out_notes
-from .overlay.reference_overlaps import input_notes
+from .overlay.left_out import Counted, LeftOut
 from .tally import Histogram, Tallies, histogram
 from .verdict_table import Measure, Verdicts
 
@@ -125,7 +120,7 @@ def _curve(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shufelt(Evaluator):
+class Shufelt(CoverageEvaluator):
     """Curves over the required overlap and the area under them (Shufelt 1999)."""
 
     name: ClassVar[str] = "shufelt"
@@ -172,20 +167,8 @@ class Shufelt(Evaluator):
         )
     )
 
-    minimum_area: float = parameter(
-        0.0, unit="m2", minimum=0.0, doc="smaller references do not count, nor do detections that overlap only them"
-    )
-
-    def evaluate(
-        self,
-        detected: Footprints,
-        reference: Footprints,
-        *,
-        area: shapely.Geometry | None = None,
-        grid: Grid | None = None,
-    ) -> Evaluation:
-        """Compare two sets; see `Evaluator.evaluate`."""
-        sets = counted_sets(detected, reference, area=area, minimum_area=self.minimum_area)
+    def measured(self, sets: CountedSets) -> tuple[Tallies, Callable[[], Verdicts]]:
+        """Return the tallies of two sets, and how their verdicts are found."""
         of_d, of_r = (
             _shares(*pair) for pair in ((sets.of_detections, sets.detections), (sets.of_references, sets.references))
         )
@@ -203,13 +186,7 @@ class Shufelt(Evaluator):
             reference_shares=_SHARES().filled(of_r),
             detection_shares=_SHARES().filled(of_d),
         )
-        return self.summarise(
-            tallies, list(input_notes(detected, reference)), find_verdicts=lambda: self._verdicts(sets)
-        )
-
-    def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:
-        """Return how many objects were left out."""
-        return tuple(left_out_notes(tallies.left_out))
+        return tallies, lambda: self._verdicts(sets)
 
     def _verdicts(self, sets: CountedSets) -> Verdicts:
         sides = [

@@ -8,6 +8,7 @@ own name.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -15,16 +16,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ..core.parameters import parameter
-from ..scenes.geodata.footprints import Footprints
-from ..scenes.geodata.raster import Grid
-from .base import Evaluation, Evaluator
+from .coverage_evaluator import CoverageEvaluator
 from .index import IndexGroup, index, ratio
-from .overlay.coverage import CountedSets, counted_sets
+from .overlay.coverage import CountedSets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
-from .overlay.left_out import LeftOut, left_out_notes
+from .overlay.left_out import LeftOut
 from .overlay.pair_shapes import corner_counts
-from .overlay.reference_overlaps import input_notes
 from .tally import Tallies
 from .verdict_table import Measure, Verdicts
 
@@ -173,7 +170,7 @@ def _compactness(polygons: NDArray[np.object_]) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SongHaithcoat(Evaluator):
+class SongHaithcoat(CoverageEvaluator):
     """Detection by any overlap, and area and shape of pairs (Song & Haithcoat 2005)."""
 
     name: ClassVar[str] = "song-haithcoat"
@@ -197,24 +194,12 @@ class SongHaithcoat(Evaluator):
         Measure(key="compactness", title="compactness", unit="ratio"),
     )
 
-    minimum_area: float = parameter(
-        0.0, unit="m2", minimum=0.0, doc="smaller references do not count, nor do detections that overlap only them"
-    )
-
-    def evaluate(
-        self,
-        detected: Footprints,
-        reference: Footprints,
-        *,
-        area: shapely.Geometry | None = None,
-        grid: Grid | None = None,
-    ) -> Evaluation:
-        """Compare two sets; see `Evaluator.evaluate`."""
-        sets = counted_sets(detected, reference, area=area, minimum_area=self.minimum_area)
+    def measured(self, sets: CountedSets) -> tuple[Tallies, Callable[[], Verdicts]]:
+        """Return the tallies of two sets, and how their verdicts are found."""
         found = np.flatnonzero(sets.references.mask & (sets.of_references.partner >= 0))
         partner = sets.of_references.partner[found]
-        r, d = reference.polygons[found], detected.polygons[partner]
-        area_r, area_d = reference.areas[found], detected.areas[partner]
+        r, d = sets.reference.polygons[found], sets.detected.polygons[partner]
+        area_r, area_d = sets.reference.areas[found], sets.detected.areas[partner]
         length_r, length_d = shapely.length(r), shapely.length(d)
         d_count, r_count = int(sets.detections.mask.sum()), int(sets.references.mask.sum())
         tallies = _Tallies(
@@ -236,13 +221,7 @@ class SongHaithcoat(Evaluator):
             ),
             left_out=sets.left_out,
         )
-        return self.summarise(
-            tallies, list(input_notes(detected, reference)), find_verdicts=lambda: self._verdicts(sets)
-        )
-
-    def notes_of(self, tallies: _Tallies) -> tuple[str, ...]:
-        """Return how many objects were left out."""
-        return tuple(left_out_notes(tallies.left_out))
+        return tallies, lambda: self._verdicts(sets)
 
     def _verdicts(self, sets: CountedSets) -> Verdicts:
         sides = [

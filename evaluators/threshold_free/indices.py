@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..index import Better, Formula, IndexGroup, index, ratio
+from . import area_formulas
 from .tallies import ThresholdFreeTallies
 
 __all__ = [
@@ -136,7 +137,7 @@ class PixelIndices(IndexGroup):
         "C_mp",
         "higher",
         "fraction",
-        lambda t: ratio(t.areas.true_positive, t.areas.true_positive + t.areas.false_negative),
+        lambda t: area_formulas.area_completeness(t.areas),
         meaning="T/(T+M)",
         place="4.2.2",
     )
@@ -145,7 +146,7 @@ class PixelIndices(IndexGroup):
         "C_rp",
         "higher",
         "fraction",
-        lambda t: ratio(t.areas.true_positive, t.areas.true_positive + t.areas.false_positive),
+        lambda t: area_formulas.area_correctness(t.areas),
         meaning="T/(T+F)",
         place="4.2.2",
     )
@@ -154,7 +155,7 @@ class PixelIndices(IndexGroup):
         "Q_lp",
         "higher",
         "fraction",
-        lambda t: ratio(t.areas.true_positive, t.areas.true_positive + t.areas.false_positive + t.areas.false_negative),
+        lambda t: area_formulas.area_quality(t.areas),
         meaning="T/(T+F+M)",
         place="4.2.2",
     )
@@ -163,7 +164,7 @@ class PixelIndices(IndexGroup):
         "A_oe",
         "lower",
         "fraction",
-        lambda t: ratio(t.areas.false_negative, t.areas.true_positive + t.areas.false_negative),
+        lambda t: area_formulas.area_omission(t.areas),
         meaning="M/(T+M)",
         place="4.2.2",
     )
@@ -172,7 +173,7 @@ class PixelIndices(IndexGroup):
         "A_ce",
         "lower",
         "fraction",
-        lambda t: ratio(t.areas.false_positive, t.areas.true_positive + t.areas.false_positive),
+        lambda t: area_formulas.area_commission(t.areas),
         meaning="F/(T+F)",
         place="4.2.2",
     )
@@ -181,7 +182,7 @@ class PixelIndices(IndexGroup):
         "B_f",
         "lower",
         "ratio",
-        lambda t: ratio(t.areas.false_positive, t.areas.true_positive),
+        lambda t: area_formulas.branching(t.areas),
         meaning="F/T",
         place="4.2.2",
     )
@@ -190,7 +191,7 @@ class PixelIndices(IndexGroup):
         "M_f",
         "lower",
         "ratio",
-        lambda t: ratio(t.areas.false_negative, t.areas.true_positive),
+        lambda t: area_formulas.miss(t.areas),
         meaning="M/T",
         place="4.2.2",
     )
@@ -228,7 +229,7 @@ class PixelLiteralIndices(IndexGroup):
         "pixel completeness, literal",
         "higher",
         "fraction",
-        lambda t: ratio(t.literal_areas.true_positive, t.literal_areas.true_positive + t.literal_areas.false_negative),
+        lambda t: area_formulas.area_completeness(t.literal_areas),
         meaning="T/(T+M), entity by entity",
         source=_LITERAL,
     )
@@ -236,7 +237,7 @@ class PixelLiteralIndices(IndexGroup):
         "pixel correctness, literal",
         "higher",
         "fraction",
-        lambda t: ratio(t.literal_areas.true_positive, t.literal_areas.true_positive + t.literal_areas.false_positive),
+        lambda t: area_formulas.area_correctness(t.literal_areas),
         meaning="T/(T+F), entity by entity",
         source=_LITERAL,
     )
@@ -244,10 +245,7 @@ class PixelLiteralIndices(IndexGroup):
         "pixel quality, literal",
         "higher",
         "fraction",
-        lambda t: ratio(
-            t.literal_areas.true_positive,
-            t.literal_areas.true_positive + t.literal_areas.false_positive + t.literal_areas.false_negative,
-        ),
+        lambda t: area_formulas.area_quality(t.literal_areas),
         meaning="T/(T+F+M), entity by entity",
         source=_LITERAL,
     )
@@ -255,7 +253,7 @@ class PixelLiteralIndices(IndexGroup):
         "area omission error, literal",
         "lower",
         "fraction",
-        lambda t: ratio(t.literal_areas.false_negative, t.literal_areas.true_positive + t.literal_areas.false_negative),
+        lambda t: area_formulas.area_omission(t.literal_areas),
         meaning="M/(T+M), entity by entity",
         source=_LITERAL,
     )
@@ -263,7 +261,7 @@ class PixelLiteralIndices(IndexGroup):
         "area commission error, literal",
         "lower",
         "fraction",
-        lambda t: ratio(t.literal_areas.false_positive, t.literal_areas.true_positive + t.literal_areas.false_positive),
+        lambda t: area_formulas.area_commission(t.literal_areas),
         meaning="F/(T+F), entity by entity",
         source=_LITERAL,
     )
@@ -271,7 +269,7 @@ class PixelLiteralIndices(IndexGroup):
         "branching factor, literal",
         "lower",
         "ratio",
-        lambda t: ratio(t.literal_areas.false_positive, t.literal_areas.true_positive),
+        lambda t: area_formulas.branching(t.literal_areas),
         meaning="F/T, entity by entity",
         source=_LITERAL,
     )
@@ -279,7 +277,7 @@ class PixelLiteralIndices(IndexGroup):
         "miss factor, literal",
         "lower",
         "ratio",
-        lambda t: ratio(t.literal_areas.false_negative, t.literal_areas.true_positive),
+        lambda t: area_formulas.miss(t.literal_areas),
         meaning="M/T, entity by entity",
         source=_LITERAL,
     )
