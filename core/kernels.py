@@ -34,7 +34,7 @@ from numba.core import types as numba_types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache
 from numba.np.ufunc import ufuncbuilder, wrappers
 
-from . import kernel_files
+from . import inner_kernels, kernel_files
 from .code_digest import UnknownCodeError, code_digest
 
 __all__ = ["cache_folder", "kernel", "track_dependencies_of_numba"]
@@ -80,6 +80,7 @@ def kernel(function: Any = None, *, inline: str = "never") -> Any:
     if isinstance(compiled, _Dispatcher):  # it is the function itself under NUMBA_DISABLE_JIT
         compiled._cache = _KernelCache(compiled, files=False)
         compiled.get_call_template = partial(_call_without_literals, compiled)
+        compiled.compile = partial(inner_kernels.compile_kernel, compiled)
     return compiled
 
 
@@ -162,7 +163,10 @@ class _KernelCache(FunctionCache):
         if content is None:
             return None
         try:
-            return self._impl.rebuild(target_context, serialize.loads(content))
+            loaded = serialize.loads(content)
+            if inner_kernels.compiles_inner():
+                return inner_kernels.rebuild(target_context, loaded)
+            return self._impl.rebuild(target_context, loaded)
         except Exception:
             # The checksum is right, so another environment wrote it; whatever is wrong with it, compiling helps.
             kernel_files.remove(cache_folder(), name)
@@ -174,7 +178,8 @@ class _KernelCache(FunctionCache):
             return
         folder = cache_folder()
         try:
-            kernel_files.save(folder, name, serialize.dumps(self._impl.reduce(data)))
+            reduce = inner_kernels.reduce if inner_kernels.compiles_inner() else self._impl.reduce
+            kernel_files.save(folder, name, serialize.dumps(reduce(data)))
         except OSError as error:
             if not _KernelCache._warned:
                 _KernelCache._warned = True
@@ -196,7 +201,8 @@ class _KernelCache(FunctionCache):
         code = code_digest(self._dispatcher, described, files=self._files)
         settings = [(name, repr(getattr(config, name, None))) for name in _SETTINGS]
         versions = numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag
-        key = repr((code, len(arguments), codegen.magic_tuple(), versions, settings))
+        inner = inner_kernels.compiles_inner()
+        key = repr((code, len(arguments), codegen.magic_tuple(), versions, settings, inner))
         title = re.sub(r"[^\w.]", "", self._dispatcher.py_func.__qualname__)[-60:]
         return f"{title}-{hashlib.sha256(key.encode()).hexdigest()[:40]}"
 
