@@ -7,6 +7,7 @@ package, presets of the generator, and scene folders in the current directory.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -188,7 +189,11 @@ def _described(plugin: Detector | Evaluator | type[Detector | Evaluator], *, nam
             kind="detectors",
             name=name,
             meaning=meaning,
-            facts={"inputs": ", ".join(kind.requires), "random": "yes" if kind.stochastic else "no"},
+            facts={
+                "inputs": ", ".join(kind.requires),
+                "random": "yes" if kind.stochastic else "no",
+                "paper": kind.paper,
+            },
             description=description,
             parameters=parameters,
             options=options,
@@ -202,6 +207,7 @@ def _described(plugin: Detector | Evaluator | type[Detector | Evaluator], *, nam
         facts={
             "indices": str(len(kind.indices)),
             "ranks by": f"{ranks.key} ({ranks.symbol})" if ranks.symbol else ranks.key,
+            "paper": kind.paper,
         },
         description=description,
         parameters=parameters,
@@ -306,6 +312,11 @@ def _shipped_entry(name: str) -> Entry:
     )
 
 
+def _range(index: Index) -> str:
+    low, high = index.range
+    return f"from {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
+
+
 def _index_entry(evaluator: str, index: Index) -> Entry:
     return Entry(
         kind="indices",
@@ -314,6 +325,7 @@ def _index_entry(evaluator: str, index: Index) -> Entry:
         facts={
             "symbol": index.symbol,
             "unit": index.unit,
+            "range": _range(index),
             "better": index.better,
             "evaluator": evaluator,
             "source": index.source,

@@ -29,6 +29,7 @@ def list_names(
     found = entries(kind)
     if form == "table":
         typer.echo(format_entries(found, table_console().width))
+        typer.echo("'roofbench info NAME' explains one of them", err=True)
         return
     table = catalogue_table(found)
     typer.echo({"csv": table.to_csv, "md": table.to_markdown, "json": table.to_json}[form]().rstrip("\n"))

@@ -36,6 +36,8 @@ class Detector(Parameterised, ABC):
         Name on the command line and in tables.
     requires : tuple of str
         Inputs without which it is skipped: ``points``, ``image``, ``colour``, ``nir``, ``dem``.
+    paper : str
+        Where it is published; empty for none.
     stochastic : bool
         Whether different seeds give different footprints.
     halo : float
@@ -49,6 +51,7 @@ class Detector(Parameterised, ABC):
 
     name: ClassVar[str]
     requires: ClassVar[tuple[str, ...]] = ("points",)
+    paper: ClassVar[str] = ""
     stochastic: ClassVar[bool] = False
     halo: ClassVar[float] = 150.0
     numbers: ClassVar[tuple[str, ...]] = ()

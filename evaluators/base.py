@@ -114,6 +114,8 @@ class Evaluator(Parameterised, ABC):
     Attributes
     ----------
     name : str
+    paper : str
+        Where it is published; empty for none.
     groups : tuple of IndexGroup classes
         What it reports, in order; `indices` follows from them.
     indices : tuple of Index
@@ -165,6 +167,7 @@ class Evaluator(Parameterised, ABC):
     """
 
     name: ClassVar[str]
+    paper: ClassVar[str] = ""
     groups: ClassVar[tuple[type[IndexGroup], ...]] = ()
     indices: ClassVar[tuple[Index, ...]] = ()
     tallies_type: ClassVar[type[Tallies]]

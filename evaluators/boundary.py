@@ -278,6 +278,7 @@ class Boundary(Evaluator):
     """Outline distances and shapes of matched footprints: PoLiS, Hausdorff, boundary IoU, C-IoU, S-IoU."""
 
     name: ClassVar[str] = "boundary"
+    paper = "Avbelj, Müller & Bamler 2015, doi:10.1109/LGRS.2014.2330695; further ones at the indices"
     groups = (BoundaryIndices, ComplexityIndices, CornerIndices, RegularityIndices)
     tallies_type = _Tallies
     ranked_by: ClassVar[str] = "boundary.iou"

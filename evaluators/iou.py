@@ -216,6 +216,7 @@ class IoU(CoverageEvaluator):
     """Greedy matching by IoU: precision, recall, F1, AP, AR and panoptic quality (SpaceNet, COCO)."""
 
     name: ClassVar[str] = "iou"
+    paper = "Van Etten, Lindenbaum & Bacastow 2018; Lin et al. 2014, doi:10.1007/978-3-319-10602-1_48"
     groups = (IoUIndices, APIndices, PanopticIndices)
     tallies_type = _Tallies
     ranked_by: ClassVar[str] = "iou.f1"

@@ -218,6 +218,7 @@ class Rutzinger(CoverageEvaluator):
     """Threshold-based object evaluation (Rottensteiner et al. 2005, 2014; Rutzinger et al. 2009)."""
 
     name: ClassVar[str] = "rutzinger"
+    paper = "Rutzinger, Rottensteiner & Pfeifer 2009, doi:10.1109/JSTARS.2009.2012488"
     groups = (RutzingerObjectIndices, RutzingerAreaIndices)
     tallies_type = _Tallies
     ranked_by: ClassVar[str] = "object.quality"

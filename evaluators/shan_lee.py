@@ -172,6 +172,7 @@ class ShanLee(CoverageEvaluator):
     """Histograms of how well each building is overlapped (Shan & Lee 2005)."""
 
     name: ClassVar[str] = "shan-lee"
+    paper = "Shan & Lee 2005, doi:10.1061/(ASCE)0733-9453(2005)131:1(27)"
     groups = (ShanLeeIndices,)
     tallies_type = _Tallies
     ranked_by: ClassVar[str] = "building.fitness"

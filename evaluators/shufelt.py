@@ -124,6 +124,7 @@ class Shufelt(CoverageEvaluator):
     """Curves over the required overlap and the area under them (Shufelt 1999)."""
 
     name: ClassVar[str] = "shufelt"
+    paper = "Shufelt 1999, doi:10.1109/34.761262"
     groups = (ShufeltReferenceIndices, ShufeltDetectionIndices)
     tallies_type = _Tallies
     ranked_by: ClassVar[str] = "reference.area_under_curve"

@@ -174,6 +174,7 @@ class SongHaithcoat(CoverageEvaluator):
     """Detection by any overlap, and area and shape of pairs (Song & Haithcoat 2005)."""
 
     name: ClassVar[str] = "song-haithcoat"
+    paper = "Song & Haithcoat 2005, doi:10.1109/TGRS.2004.841627"
     groups = (DetectionIndices, OverlayIndices, ShapeIndices)
     tallies_type = _Tallies
     ranked_by: ClassVar[str] = "detection.rate"

@@ -12,7 +12,7 @@ from .tables import Column, Table
 __all__ = ["catalogue_table", "format_entries", "format_entry"]
 
 #: Facts that the page of an entry shows and the table of its kind does not.
-_LONG = ("source", "evaluators")
+_LONG = ("source", "evaluators", "paper", "range")
 
 
 def catalogue_table(entries: Sequence[Entry]) -> Table:

@@ -11,7 +11,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..evaluators.threshold_free.verdicts import VERDICT_KINDS
 from ..evaluators.uncertainty.paired_files import PairedFiles
 from ..evaluators.verdict_table import VerdictTable
 from .qgis_style import pair_styles
@@ -48,7 +47,12 @@ def write_pair_stream(found: PairedFiles, path: str | os.PathLike[str], *, overw
             for place, name in enumerate("ab")
         ]
         write_streamed(
-            layers, path, layer="comparison", styles=pair_styles(VERDICT_KINDS), overwrite=overwrite, scratch=files.work
+            layers,
+            path,
+            layer="comparison",
+            styles=pair_styles(found.evaluator.verdict_kinds),
+            overwrite=overwrite,
+            scratch=files.work,
         )
 
 

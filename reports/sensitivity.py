@@ -12,9 +12,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from ..benchmark.analysis.report_data import Sensitivity
 from ..core.parameters import parameter_text
@@ -42,7 +44,9 @@ def sensitivity_figure(lines: Sequence[Sensitivity], *, level: float | None = No
     indices = list({line.index.key: line.index for line in lines}.values())
     columns = min(_COLUMNS, len(axes_names))
     rows = math.ceil(len(axes_names) / columns)
-    figure = new_figure(max(4.4, 3.25 * columns), 2.75 * rows + 0.35 * math.ceil((len(detectors) + len(indices)) / 4))
+    figure = new_figure(
+        max(4.4, 3.25 * columns), 2.75 * rows + 0.35 * math.ceil((len(detectors) + len(indices) + 4) / 4)
+    )
     # One scale for all panels, so that slopes can be compared.
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     percent = all(index.unit == "fraction" for index in indices)
@@ -53,17 +57,22 @@ def sensitivity_figure(lines: Sequence[Sensitivity], *, level: float | None = No
         style_axes(panel)
         own = [line for line in lines if line.axis == name]
         values, places = _places(own)
+        broken = 0
         for line in own:
             colour, marker = SERIES[detectors.index(line.detector) % len(SERIES)]
             dash = _DASHES[[index.key for index in indices].index(line.index.key) % len(_DASHES)]
             _draw_line(panel, line, places, colour=colour, marker=marker, dash=dash, factor=factor)
+            if line.break_down is not None and line.break_down.value is not None:
+                _draw_break_down(panel, line.break_down.value, broken, colour)
+                broken += 1
         if level is not None and percent:
             panel.axhline(100 * level, color=INK, linewidth=0.8, linestyle=":", alpha=0.7)
         _label_axis(panel, name, own, values, places)
     units = " / ".join(dict.fromkeys(index.symbol or index.title for index in indices))
     for row in grid:
         row[0].set_ylabel(f"{units} [{'%' if percent else indices[0].unit}], mean over scenes")
-    _legend(figure, detectors, [index.title if len(index.title) > 9 else _named(index.key) for index in indices])
+    words = [index.title if len(index.title) > 9 else _named(index.key) for index in indices]
+    _legend(figure, detectors, words, _marks(lines, level if percent else None))
     return figure
 
 
@@ -116,16 +125,19 @@ def _draw_line(
             markeredgecolor=INK,
             markeredgewidth=1,
         )
-    if line.break_down is not None and line.break_down.value is not None:
-        panel.plot(
-            line.break_down.value,
-            0.0,
-            marker="v",
-            color=colour,
-            markersize=7,
-            transform=panel.get_xaxis_transform(),
-            clip_on=False,
-        )
+
+
+def _draw_break_down(panel: Axes, value: float, number: int, colour: str) -> None:
+    """Draw a triangle on the axis; each stands above the one before, since several may lie at one value."""
+    panel.plot(
+        value,
+        0.055 * number,
+        marker="v",
+        color=colour,
+        markersize=7,
+        transform=panel.get_xaxis_transform(),
+        clip_on=False,
+    )
 
 
 def _label_axis(
@@ -146,8 +158,24 @@ def _label_axis(
         )
 
 
-def _legend(figure: Figure, detectors: Sequence[str], indices: Sequence[str]) -> None:
-    handles = [
+def _marks(lines: Sequence[Sensitivity], level: float | None) -> list[Artist]:
+    """Return the legend of bands, rings, triangles and the dotted line, as far as they are drawn."""
+    ring: dict[str, Any] = {"marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgecolor": INK}
+    points = [point for line in lines for point in line.points]
+    marks: list[Artist] = []
+    if any(point.low is not None for point in points):
+        marks.append(Patch(facecolor=INK, alpha=0.15, label="95 % interval"))
+    if any(point.value == line.default for line in lines for point in line.points):
+        marks.append(Line2D([], [], linestyle="", label="default value", **ring))
+    if level is not None:
+        marks.append(Line2D([], [], color=INK, linewidth=0.8, linestyle=":", label=f"{100 * level:g} %"))
+    if any(line.break_down is not None and line.break_down.value is not None for line in lines):
+        marks.append(Line2D([], [], color=INK, marker="v", markersize=6, linestyle="", label="passes the level"))
+    return marks
+
+
+def _legend(figure: Figure, detectors: Sequence[str], indices: Sequence[str], marks: Sequence[Artist]) -> None:
+    handles: list[Artist] = [
         Line2D([], [], color=colour, marker=marker, markersize=5, linewidth=1.5, label=shortened(name))
         for name, (colour, marker) in zip(detectors, SERIES * (len(detectors) // len(SERIES) + 1), strict=False)
     ]
@@ -156,9 +184,9 @@ def _legend(figure: Figure, detectors: Sequence[str], indices: Sequence[str]) ->
         for place, name in enumerate(indices)
     ]
     figure.legend(
-        handles=handles,
+        handles=[*handles, *marks],
         loc="outside lower center",
-        ncols=min(4, len(handles)),
+        ncols=min(4, len(handles) + len(marks)),
         frameon=False,
         fontsize=9,
         labelcolor=INK,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..evaluators.in_parts import FileComparison
-from ..evaluators.threshold_free.verdicts import VERDICT_KINDS
 from ..evaluators.verdict_table import VerdictTable
 from .qgis_style import verdict_styles
 from .streamed_layers import Rows, StreamedLayer, write_streamed
@@ -38,7 +37,12 @@ def write_verdict_stream(comparison: FileComparison, path: str | os.PathLike[str
         for place, side in enumerate(("detection", "reference"))
     ]
     write_streamed(
-        layers, path, layer="verdicts", styles=verdict_styles(VERDICT_KINDS), overwrite=overwrite, scratch=files.work
+        layers,
+        path,
+        layer="verdicts",
+        styles=verdict_styles(comparison.evaluation.evaluator.verdict_kinds),
+        overwrite=overwrite,
+        scratch=files.work,
     )
 
 

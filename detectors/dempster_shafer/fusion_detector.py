@@ -76,6 +76,7 @@ class DempsterShafer(Detector):
     """Fusion of height, pulse, colour and texture cues by Dempster's rule, cell by cell and region by region."""
 
     name = "dempster-shafer"
+    paper = "Rottensteiner, Trinder, Clode & Kubik 2005, Information Fusion 6"
     requires = ("points",)
 
     cell: float | None = parameter(

@@ -41,6 +41,7 @@ class Improved(LineDetector):
     """Line detector with texture of Awrangjeb, Zhang & Fraser (2011)."""
 
     name: ClassVar[str] = "improved"
+    paper = "Awrangjeb, Zhang & Fraser 2011, IAPRS XXXVIII-3/W22"
     modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "paper": {
             **PAPER,

@@ -56,6 +56,7 @@ class MPP(MPPParameters, Detector):
     """Rectangles sampled by reversible jumps (RJMCMC) from the energy of a marked point process, without any image."""
 
     name: ClassVar[str] = "mpp"
+    paper = "after Yu, Li, Guan & Wang 2013, Remote Sensing Letters 4(11), doi:10.1080/2150704X.2013.846487"
     requires: ClassVar[tuple[str, ...]] = ("points",)
     stochastic: ClassVar[bool] = True
     numbers: ClassVar[tuple[str, ...]] = ("part_of",)

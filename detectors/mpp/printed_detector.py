@@ -54,6 +54,7 @@ class MPPPrinted(Detector):
     """Rectangles by the simulation printed in 2013: one Gaussian per class, acceptance by a constant ratio."""
 
     name: ClassVar[str] = "mpp-printed"
+    paper = "Yu, Li, Guan & Wang 2013, Remote Sensing Letters 4(11), doi:10.1080/2150704X.2013.846487"
     requires: ClassVar[tuple[str, ...]] = ("points",)
     stochastic: ClassVar[bool] = True
     halo: ClassVar[float] = 340.0

@@ -112,6 +112,7 @@ class ThresholdFree(Evaluator):
     """Threshold-free, pseudo one-to-one evaluation with 15 indices (Awrangjeb, Ravanbakhsh & Fraser 2010)."""
 
     name: ClassVar[str] = "threshold-free"
+    paper = "Awrangjeb, Ravanbakhsh & Fraser 2010, ISPRS Journal of Photogrammetry and Remote Sensing 65(5), section 4"
     groups = GROUPS
     tallies_type = ThresholdFreeTallies
     evaluation_type = ThresholdFreeEvaluation

@@ -47,6 +47,7 @@ def test_a_detector_is_explained_with_its_parameters(tmp_path):
     message = roofbench("info", "ndsm", folder=tmp_path).stdout
     assert "ndsm (detector)" in message
     assert "height [2.5 m], from 0.5 to 20 m" in message
+    assert "doi:10.1080/2150704X.2013.846487" in roofbench("info", "mpp-printed", folder=tmp_path).stdout
     assert "Source: Awrangjeb 2010, section 3.2" in message
     assert "Example: roofbench run quick -d 'ndsm[height=1.5]'" in message
 
@@ -62,7 +63,9 @@ def test_a_selection_is_explained_with_the_values_of_its_mode_and_readings_apart
 
 @pytest.mark.parametrize("name", ["Q_l", "object.quality"])
 def test_an_index_is_explained_by_key_and_by_symbol(name, tmp_path):
-    assert "quality: TP/(TP+FP+FN)" in roofbench("info", name, folder=tmp_path).stdout
+    text = roofbench("info", name, folder=tmp_path).stdout
+    assert "quality: TP/(TP+FP+FN)" in text
+    assert "range      0 to 1" in text
 
 
 def test_an_index_of_two_evaluators_is_explained_for_both():

@@ -1,6 +1,7 @@
 """Lines of stored sweeps: every point of a line is over the same scenes."""
 
 import json
+from dataclasses import replace
 
 from roofbench.benchmark.analysis.sensitivity import stored_sensitivities
 from roofbench.benchmark.identity.recipes import SceneRecipe
@@ -91,3 +92,17 @@ def test_a_point_with_fewer_defined_scenes_says_so_in_the_figure():
     assert points_of(line) == [(5, 0.6, 2), (10, 0.4, 1)]
     (panel,) = sensitivity_figure([line]).axes
     assert [text.get_text() for text in panel.texts] == ["n = 1"]
+
+
+def test_the_figure_names_its_marks_and_keeps_break_downs_apart():
+    stored = Stored()
+    for seed in (1, 2):
+        for slope, quality in ((5, 0.9), (10, 0.7)):
+            stored.add(quality, seed=seed, scene={"slope": slope})
+    line = stored.line()
+    figure = sensitivity_figure([line, replace(line, detector="other")], level=0.8)
+    (panel,) = figure.axes
+    triangles = [mark.get_ydata()[0] for mark in panel.lines if mark.get_marker() == "v"]
+    assert len(set(triangles)) == len(triangles) == 2
+    (legend,) = figure.legends
+    assert {"95 % interval", "80 %", "passes the level"} <= {text.get_text() for text in legend.get_texts()}
