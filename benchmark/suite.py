@@ -164,6 +164,11 @@ def scenes_of(words: Iterable[str]) -> tuple[SceneRecipe, ...]:
                         f"{word!r} is a file of measurements and no scene: make a scene folder of it with "
                         "'roofbench scenes import'"
                     )
+                if word in suite_names() or path.suffix == ".toml":
+                    raise UnknownNameError(
+                        f"{word!r} is a suite and no scene: 'roofbench run {word}' runs it by itself, "
+                        "'roofbench list scenes' shows single scenes"
+                    )
                 raise UnknownNameError(
                     f"{word!r} is no scene, preset or suite{nearest_hint(name, known)}: 'roofbench list scenes' "
                     "and 'roofbench list suites' show what there is"

@@ -116,9 +116,15 @@ class Command(typer.core.TyperCommand):
         try:
             return super().invoke(ctx)
         except RoofbenchError as error:
-            long = {parameter.name: max(parameter.opts, key=len) for parameter in self.params if parameter.name}
-            options = {name: option for name, option in long.items() if option.startswith("--")}
-            error.args = (option_names(str(error), options),)
+            options = {
+                parameter.name: str(parameter.metavar) if _is_argument(parameter) else max(parameter.opts, key=len)
+                for parameter in self.params
+                if parameter.name
+            }
+            message = str(error)
+            if "overwrite" not in options:
+                message = message.replace("set overwrite=True or ", "")
+            error.args = (option_names(message, options),)
             raise
 
 

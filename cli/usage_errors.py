@@ -62,7 +62,7 @@ def _hint(name: str, known: Iterable[str]) -> str:
 
 def _usage(context: Any) -> str:
     """Return the arguments of a command as they are typed, options left out."""
-    return " ".join(str(context.get_usage()).partition(":")[2].replace("[OPTIONS] ", "").split())
+    return " ".join(str(context.get_usage()).partition(":")[2].replace("[OPTIONS]", "").split())
 
 
 def _name(parameter: Any) -> str:
@@ -75,8 +75,10 @@ def _described(parameter: Any) -> str:
     name = _name(parameter)
     if name.startswith("-") and parameter.metavar:
         name = f"{name} {parameter.metavar}"
-    meaning = re.split(r"\.( |$)| \(|: |; ", str(getattr(parameter, "help", None) or ""))[0]
-    return f"{name} ({meaning[:1].lower()}{meaning[1:]})" if meaning else name
+    meaning = re.split(r"\.(?: [A-Z]|$)| \(|: |; ", str(getattr(parameter, "help", None) or ""))[0]
+    if meaning[1:2].islower():
+        meaning = meaning[:1].lower() + meaning[1:]
+    return f"{name} ({meaning})" if meaning else name
 
 
 def _options(context: Any) -> list[str]:

@@ -40,6 +40,13 @@ MISTAKES = [
     ("scenes fetch ahn4bag", "(did you mean 'ahn4-bag'?)"),
     ("sweep ndsm hamlet --vary heigth=1,2", "(did you mean 'height'?)"),
     ("info ndms", "(did you mean 'ndsm'?)"),
+    ("detect", "needs DETECTOR (NAME, 'NAME[parameter=value,...]' or FILE.py:CLASS)"),
+    ("detect ndsm quick -o a.gpkg", "'quick' is a suite and no scene: 'roofbench run quick' runs it by itself"),
+    ("run hamlet quick", "'quick' is a suite and no scene"),
+    ("baseline save", "write 'roofbench baseline save --output FILE'"),
+    ("plot gate", "needs RESULT (output of 'roofbench gate ... --format json')"),
+    ("report absent.sqlite", "'roofbench run' makes one, or name it by STORE"),
+    ("new suite own -o .", ". exists already: name another file"),
 ]
 
 
