@@ -22,6 +22,8 @@ from .block_cells import built_cells
 
 __all__ = ["outline_blocks"]
 
+#: Metres: how far walls of one block influence each other.
+_REACH = 64.0
 #: Metres: least distance of points that are no wall.
 _STRAIGHT = 0.5
 #: Square metres: smallest block.
@@ -53,7 +55,7 @@ def outline_blocks(
     """
     gsd = grid.gsd
     traced = _traced(built_cells(rectangles, gsd, height, state, score), grid)
-    polygons: NDArray[np.object_] = regularise(traced, max(gsd, _STRAIGHT))
+    polygons: NDArray[np.object_] = regularise(traced, max(gsd, _STRAIGHT), reach=_REACH)
     large: NDArray[np.bool_] = shapely.area(polygons) >= _SMALLEST
     return polygons[large]
 

@@ -13,6 +13,7 @@ Coordinates are metres, x east and y north; angles are counted from x towards y.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -33,7 +34,12 @@ _PARALLEL, _GRAZING = math.radians(2), math.radians(10)
 
 
 def regularise(
-    polygons: NDArray[np.object_], tolerance: float, *, angle: float = 15.0, least_agreement: float = 0.85
+    polygons: NDArray[np.object_],
+    tolerance: float,
+    *,
+    angle: float = 15.0,
+    least_agreement: float = 0.85,
+    reach: float = math.inf,
 ) -> NDArray[np.object_]:
     """Return the polygons with walls along their main directions and right angles between them.
 
@@ -52,11 +58,14 @@ def regularise(
         Degrees.
     least_agreement : float
         0..1.
+    reach : float
+        Metres. In a polygon longer than twice that, the main directions of a wall are those of the walls whose centres
+        are so near, so that what a wall becomes does not depend on a far end that a window of a scene may not show.
     """
     simple = simplify(polygons, tolerance)
     result = simple.copy()
     for number, (traced, plain) in enumerate(zip(polygons, simple, strict=True)):
-        regular = _regular(traced, plain, tolerance, math.radians(angle))
+        regular = _regular(traced, plain, tolerance, math.radians(angle), reach)
         if regular is None or not regular.is_valid:
             continue
         common = regular.intersection(traced).area
@@ -65,24 +74,57 @@ def regularise(
     return result
 
 
-def _regular(traced: Any, simple: Any, tolerance: float, angle: float) -> Any | None:
+def _regular(traced: Any, simple: Any, tolerance: float, angle: float, reach: float) -> Any | None:
     """Return one regularised polygon, or None when its exterior ring has fewer than three corners."""
     origin = np.array(traced.bounds[:2])
     sources = [shapely.get_coordinates(ring)[:-1] - origin for ring in (traced.exterior, *traced.interiors)]
+    is_long = max(traced.bounds[2] - traced.bounds[0], traced.bounds[3] - traced.bounds[1]) > 2 * reach
+    corners = [shapely.get_coordinates(ring)[:-1] - origin for ring in (simple.exterior, *simple.interiors)]
+    if is_long:
+        corners = [_corners_by_squares(ring, origin, tolerance, reach) for ring in sources]
+        corners = [ring for number, ring in enumerate(corners) if number == 0 or len(ring) >= 3]
     rings = []
-    for ring in (simple.exterior, *simple.interiors):
-        walls = _fit_walls(shapely.get_coordinates(ring)[:-1] - origin, sources)
+    for ring in corners:
+        walls = _fit_walls(ring, sources)
         if walls is None:
             return None
         rings.append(walls)
-    mains = _main_directions(np.concatenate(rings))
+    together = np.concatenate(rings)
+    mains = np.empty((0, 0)) if is_long else _main_directions(together)
     outlines = []
     for walls in rings:
-        merged = _merged(_turned(walls, mains, tolerance, angle), tolerance)
+        if is_long:
+            turned = _turned_by_neighbours(walls, together, tolerance, angle, reach)
+        else:
+            turned = _turned(walls, mains, tolerance, angle)
+        merged = _merged(turned, tolerance)
         outlines.append(_corners(_merged(_without_jogs(merged, tolerance), tolerance), tolerance))
     if len(outlines[0]) < 3:
         return None
     return shapely.Polygon(outlines[0] + origin, [hole + origin for hole in outlines[1:] if len(hole) >= 3])
+
+
+def _corners_by_squares(ring: _Points, origin: _Points, tolerance: float, side: float) -> _Points:
+    """Return the corners of a traced ring, simplified between the places where it enters a square of a fixed grid."""
+    square = np.floor((ring + origin) / side)
+    entered = np.flatnonzero((square != np.roll(square, 1, axis=0)).any(axis=1))
+    if len(entered) < 2:
+        whole: _Points = shapely.get_coordinates(shapely.simplify(shapely.LinearRing(ring), tolerance))
+        return whole[:-1]
+    ring = np.roll(ring, -entered[0], axis=0)
+    ends = np.append(entered - entered[0], len(ring))
+    closed = np.concatenate([ring, ring[:1]])
+    arcs = [shapely.LineString(closed[one : other + 1]) for one, other in itertools.pairwise(ends)]
+    return np.concatenate([shapely.get_coordinates(arc)[:-1] for arc in shapely.simplify(np.array(arcs), tolerance)])
+
+
+def _turned_by_neighbours(walls: _Points, others: _Points, tolerance: float, angle: float, reach: float) -> _Points:
+    """Return the walls, each rotated into the main directions of the walls around it."""
+    turned = walls.copy()
+    for number, wall in enumerate(walls):
+        near = np.hypot(others[:, 0] - wall[0], others[:, 1] - wall[1]) <= reach
+        turned[number] = _turned(walls[number : number + 1], _main_directions(others[near]), tolerance, angle)[0]
+    return turned
 
 
 def _fit_walls(corners: _Points, sources: list[_Points]) -> _Points | None:

@@ -70,3 +70,26 @@ def test_regularised_outlines_are_valid_and_agree_with_what_was_traced(seed):
     assert shapely.is_valid(regular).all()
     for one, two in zip(regular, polygons, strict=True):
         assert iou(one, two) > 0.8
+
+
+def test_walls_of_a_long_block_do_not_depend_on_its_far_end():
+    """Two wings, each along its own direction, 300 m from end to end: half of it has the same walls."""
+    rng = np.random.default_rng(2)
+    one, two = (shapely.affinity.rotate(shapely.box(0, 0, 170, 22), turn, origin=(0, 0)) for turn in (20.0, 24.0))
+    block = shapely.union(one, shapely.affinity.translate(two, 150, 58))
+    row, column = np.mgrid[0:400, 0:700]
+    x, y = 0.5 * column.ravel() - 12.75, 187.25 - 0.5 * row.ravel()
+    mask = shapely.contains_xy(block, x, y).reshape(row.shape) & (rng.random(row.shape) < 0.995)
+    grid = Grid(-13.0, 187.5, 0.5, *mask.shape)
+    part = mask.copy()
+    part[:, 440:] = False
+
+    def walls(of, reach):
+        (found,) = regularise(np.array([max(trace(coverage_of_mask(of), grid), key=shapely.area)]), 0.5, reach=reach)
+        return found.intersection(shapely.box(-20, -20, 60, 200))
+
+    near = [walls(of, 50.0) for of in (mask, part)]
+    assert shapely.area(near[0].symmetric_difference(near[1])) < 1e-6
+    assert near[0].intersection(block).area > 0.97 * near[0].area
+    far = [walls(of, np.inf) for of in (mask, part)]
+    assert shapely.area(far[0].symmetric_difference(far[1])) > 1e-3
