@@ -11,6 +11,8 @@ Rectangles locate houses and their party walls. An old block is seldom rectangul
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -38,6 +40,8 @@ def outline_blocks(
     height: NDArray[np.uint16],
     state: NDArray[np.uint8],
     score: NDArray[np.int16],
+    *,
+    within: Any = None,
 ) -> NDArray[np.object_]:
     """Return the polygons, with courtyards as holes, of the blocks that rectangles, shape (n, 5), belong to.
 
@@ -52,9 +56,13 @@ def outline_blocks(
         See `cells`.
     score : ndarray of int16, shape (rows, columns)
         See `scores`.
+    within : shapely Polygon, optional
+        Blocks that do not meet it are left out.
     """
     gsd = grid.gsd
     traced = _traced(built_cells(rectangles, gsd, height, state, score), grid)
+    if within is not None:
+        traced = traced[shapely.intersects(traced, within)]
     polygons: NDArray[np.object_] = regularise(traced, max(gsd, _STRAIGHT), reach=_REACH)
     large: NDArray[np.bool_] = shapely.area(polygons) >= _SMALLEST
     return polygons[large]

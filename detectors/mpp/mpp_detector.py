@@ -122,7 +122,7 @@ class MPP(MPPParameters, Detector):
         with started_threads(self.threads) as threads:
             prepared = prepare(self, points, seen, threads)
             ready = time.perf_counter()
-            rectangles, results = sample_scene(self, prepared, seed, seen.core, threads)
+            rectangles, results = sample_scene(self, prepared, seed, threads)
         rectangles = rectangles[self._evident(prepared, rectangles)]
         done = time.perf_counter()
         energies = rectangle_energies(prepared.tables, rectangles, prepared.model)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from ...scenes.geodata.footprints import Footprints
@@ -13,10 +14,14 @@ from .arrays import Floats, Rectangles
 from .blocks import outline_blocks
 from .energy import ground_variance
 from .preparation import Prepared
+from .rectangles import to_world
 from .roofs import KINDS, RoofFit, fit_roof
 from .rows import find_levels
 
 __all__ = ["as_footprints", "fit_roofs"]
+
+#: Metres around the core of a scene in which footprints are made, and around a block in which rectangles divide it.
+_AROUND, _BESIDE = 40.0, 25.0
 
 
 def fit_roofs(prepared: Prepared, rectangles: Rectangles) -> list[RoofFit]:
@@ -24,6 +29,14 @@ def fit_roofs(prepared: Prepared, rectangles: Rectangles) -> list[RoofFit]:
     model = prepared.model
     rules = model.roof_rules
     return [fit_roof(prepared.tables, one, rules, ground_variance(one, model)) for one in rectangles]
+
+
+def _near(outlines: NDArray[np.object_], blocks: NDArray[np.object_], wanted: Any) -> NDArray[np.bool_]:
+    """Return which rectangles decide what is built where it is wanted, and in the blocks that reach there."""
+    near = shapely.intersects(outlines, wanted)
+    if len(blocks) and len(outlines):
+        near[shapely.STRtree(outlines).query(blocks, predicate="dwithin", distance=_BESIDE)[1]] = True
+    return np.asarray(near)
 
 
 def as_footprints(
@@ -43,7 +56,10 @@ def as_footprints(
     and of a block its own. Parts and buildings have height, tau, slope (m, m, m/m), roof and energy, too: buildings
     those of their largest part, with the energies added up.
     """
-    blocks = outline_blocks(rectangles, prepared.grid, prepared.height, prepared.state, prepared.score)
+    wanted = shapely.box(*prepared.core).buffer(_AROUND, join_style="mitre")
+    blocks = outline_blocks(rectangles, prepared.grid, prepared.height, prepared.state, prepared.score, within=wanted)
+    near = _near(shapely.polygons(to_world(rectangles, prepared.grid)), blocks, wanted)
+    rectangles, energies, fits = rectangles[near], energies[near], [fits[k] for k in np.flatnonzero(near).tolist()]
     if level == "block":
         attributes: dict[str, NDArray[Any]] = {"part_of": np.arange(len(blocks))}
         return Footprints.of(blocks, crs=crs, attributes=attributes, metadata=record, source=source)

@@ -70,6 +70,8 @@ class Prepared:
     boxes : Boxes
     cues : CueInformation
         Which cues the evidence is made of.
+    core : tuple of float
+        Part of the scene whose buildings are wanted (`Scene.core`), metres.
     """
 
     grid: Grid
@@ -81,6 +83,7 @@ class Prepared:
     model: Model
     boxes: Boxes
     cues: CueInformation
+    core: tuple[float, float, float, float]
 
 
 def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads: Threads) -> Prepared:
@@ -101,7 +104,8 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
     release_memory()
     tables = make_tables(kept, fitted, score, threads=threads)
     model, grid = _model(parameters, cell), Grid.covering(scene.extent, cell)
-    return Prepared(grid, kept, state, score, background, tables, model, _rated(boxes, tables, model, threads), cues)
+    rated = _rated(boxes, tables, model, threads)
+    return Prepared(grid, kept, state, score, background, tables, model, rated, cues, scene.core)
 
 
 def _division(parameters: MPPParameters, grid: Grid) -> Division:
@@ -167,7 +171,6 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
             step=parameters.roof_step,
             share=parameters.carried_share,
             most=int(_LARGEST_STRUCTURE / cell**2),
-            division=_division(parameters, grid),
             threads=threads,
         )
         cells = replace(cells, height=height, state=state)

@@ -25,7 +25,7 @@ from .arrays import Heights, Labels, Mask, States
 from .candidates import propose_boxes
 from .cells import HIGH, LOW
 from .frames import lower_storeys
-from .patches import Division, count_rims, label_patches
+from .patches import count_rims, label_patches
 from .roughness import assign_rough_cells
 from .threads import ONE_THREAD, Threads
 
@@ -51,7 +51,6 @@ def lower_superstructures(
     step: float,
     share: float,
     most: int,
-    division: Division | None = None,
     threads: Threads = ONE_THREAD,
 ) -> tuple[Heights, States]:
     """Return heights and states with superstructures lowered to the roofs that carry them, and their shadows filled.
@@ -69,14 +68,12 @@ def lower_superstructures(
         Share of the rim that must be lower roof; more than 1 changes nothing.
     most : int
         Largest number of cells of a roof structure.
-    division : Division, optional
-        Where patches longer than any building are divided.
     threads : Threads
     """
     if share > 1:
         return height, state
     limit = round(100 * step)
-    lowered, state = _lower_storeys(height, state, roof, limit, division, threads)
+    lowered, state = _lower_storeys(height, state, roof, limit, threads)
     labels, count = label_patches(lowered, roof, limit, threads=threads)
     assign_rough_cells(lowered, state, labels, threads=threads)
     if _level_structures(lowered, state, labels, share, most, threads):
@@ -89,9 +86,7 @@ def lower_superstructures(
     return lowered, state
 
 
-def _lower_storeys(
-    height: Heights, state: States, roof: Mask, step: int, division: Division | None, threads: Threads
-) -> tuple[Heights, States]:
+def _lower_storeys(height: Heights, state: States, roof: Mask, step: int, threads: Threads) -> tuple[Heights, States]:
     """Return heights and states with the storeys of frames lowered."""
     rows, columns = state.shape
     smooth, lowered, filled = np.empty_like(height), np.empty_like(height), np.empty_like(state)
@@ -113,8 +108,8 @@ def _lower_storeys(
     threads.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
     boxes = np.concatenate(
         [
-            propose_boxes(smooth, solid, steps=(1e6,), least_cells=24, division=division, threads=threads),
-            propose_boxes(smooth, labels, steps=(0.01 * step,), least_cells=24, division=division, threads=threads),
+            propose_boxes(smooth, solid, steps=(1e6,), least_cells=24, threads=threads),
+            propose_boxes(smooth, labels, steps=(0.01 * step,), least_cells=24, threads=threads),
         ]
     )
     boxes = boxes[np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")]

@@ -43,14 +43,14 @@ _WALL_TOLERANCE = 0.25
 
 
 def sample_scene(
-    parameters: MPPParameters, prepared: Prepared, seed: int, core: tuple[float, float, float, float], threads: Threads
+    parameters: MPPParameters, prepared: Prepared, seed: int, threads: Threads
 ) -> tuple[Rectangles, list[Annealed]]:
     """Anneal every square, search along their borders, close the walls and absorb parts of larger buildings.
 
-    Of a window only the squares on which its core (metres) depends are annealed.
+    Of a window only the squares on which its core depends are annealed.
     """
     grid, model, tables = prepared.grid, prepared.model, prepared.tables
-    rounds = rounds_of(grid, core, parameters.largest_side)
+    rounds = rounds_of(grid, prepared.core, parameters.largest_side)
     results: dict[tuple[int, int], Annealed] = {}
 
     def boxes_of(square: Square) -> Boxes:
