@@ -18,7 +18,7 @@ the whole side: what `StoredObjects` list, row by row in the order of the file.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -51,24 +51,32 @@ class StoredObjects:
 
     Attributes
     ----------
-    ids, areas, centres, building_codes : ndarray
+    ids, areas, building_codes : ndarray
     quadrilateral : ndarray of bool, shape (n,)
         Convex quadrilaterals without holes.
+    read_centres : callable
+        Returns the centres, which are needed rarely and stay on disk.
     """
 
     ids: NDArray[np.int64]
     areas: NDArray[np.float64]
-    centres: NDArray[np.float64]
     building_codes: NDArray[np.int64]
     quadrilateral: NDArray[np.bool_]
+    read_centres: Callable[[], NDArray[np.float64]]
 
     def __len__(self) -> int:
         return len(self.ids)
 
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """Centre of each footprint, m, shape (n, 2)."""
+        return self.read_centres()
+
     def take(self, rows: NDArray[np.int64]) -> StoredObjects:
         """Return the footprints of some rows."""
+        centres = self.centres[rows]
         return StoredObjects(
-            self.ids[rows], self.areas[rows], self.centres[rows], self.building_codes[rows], self.quadrilateral[rows]
+            self.ids[rows], self.areas[rows], self.building_codes[rows], self.quadrilateral[rows], lambda: centres
         )
 
 
@@ -169,9 +177,9 @@ class OutlineStore:
         return StoredObjects(
             ids=ids,
             areas=self._read("areas", np.float64),
-            centres=self._read("centres", np.float64).reshape(-1, 2),
             building_codes=self._read("building_codes", np.int64) if codes.is_file() else np.arange(len(ids)),
             quadrilateral=self._read("quadrilateral", np.bool_),
+            read_centres=lambda: self._read("centres", np.float64).reshape(-1, 2),
         )
 
     def part(self, number: int) -> StoredPart:

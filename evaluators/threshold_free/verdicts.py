@@ -6,6 +6,7 @@ of them.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..overlay.left_out import Objects
 from ..verdict_table import LazyReasons, Measure, VerdictKind, VerdictTable
-from .correspondence import DECIMALS
+from .correspondence import DECIMALS, Correspondence
 from .object_graph import OverlapGraph
 
 __all__ = ["MEASURES", "VERDICT_KINDS", "find_verdicts", "verdict_tables"]
@@ -50,20 +51,21 @@ class _Neighbours:
     def __init__(
         self, own: NDArray[np.int64], other: NDArray[np.int64], distances: NDArray[np.float64], count: int
     ) -> None:
-        self.count = np.bincount(own, minlength=count)
-        self._start = np.concatenate([[0], np.cumsum(self.count)])
-        self._pair = np.argsort(own, kind="stable")
+        # Half the memory: a nation has ten million objects and more pairs, but never 2^31.
+        self.count = np.bincount(own, minlength=count).astype(np.int32)
+        self._start = np.zeros(count + 1, dtype=np.int32)
+        np.cumsum(self.count, out=self._start[1:])
+        self._pair = np.argsort(own, kind="stable").astype(np.int32)
         # Only objects with several neighbours need an order among them.
         several = np.flatnonzero(self.count[own[self._pair]] > 1)
         pair = self._pair[several]
         order = np.lexsort((other[pair], np.round(distances[pair], DECIMALS), own[pair]))
         self._pair[several] = pair[order]
-        self._other = other[self._pair]
+        self._other = other[self._pair].astype(np.int32)
 
     def nearest(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the nearest neighbour of objects that have one."""
-        neighbours: NDArray[np.int64] = self._other[self._start[rows]]
-        return neighbours
+        return self._other[self._start[rows]].astype(np.int64)
 
     def of(self, rows: NDArray[np.int64]) -> list[list[int]]:
         """Return all neighbours of some objects."""
@@ -198,29 +200,32 @@ class _Claims:
 
     Attributes
     ----------
-    pieces : ndarray of int64
+    pieces : ndarray of int32
         Detections that are matched with a reference or are pieces of it: more than one where it is split.
-    times : ndarray of int64
+    times : ndarray of int32
         Detections that are matched with it or duplicate that one: more than one where it is detected again.
-    home : ndarray of int64
-        For each detection the reference that it is matched with or booked on, or -1.
+    match : Correspondence
     """
 
-    pieces: NDArray[np.int64]
-    times: NDArray[np.int64]
-    home: NDArray[np.int64]
+    pieces: NDArray[np.int32]
+    times: NDArray[np.int32]
+    match: Correspondence
 
     @classmethod
     def of(cls, graph: OverlapGraph) -> _Claims:
         match = graph.correspondence
         multiple = graph.detections.mask & (match.of_detection < 0) & (match.booked_on >= 0)
-        found = (match.of_reference >= 0).astype(np.int64)
+        found = (match.of_reference >= 0).astype(np.int32)
 
-        def booked(kind: NDArray[np.bool_]) -> NDArray[np.int64]:
-            return np.bincount(match.booked_on[multiple & kind], minlength=len(found))
+        def booked(kind: NDArray[np.bool_]) -> NDArray[np.int32]:
+            return np.bincount(match.booked_on[multiple & kind], minlength=len(found)).astype(np.int32)
 
-        home = np.where(match.of_detection >= 0, match.of_detection, match.booked_on)
-        return cls(found + booked(~graph.duplicates), found + booked(graph.duplicates), home)
+        return cls(found + booked(~graph.duplicates), found + booked(graph.duplicates), match)
+
+    def home(self, detections: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the reference that each of some detections is matched with or booked on, or -1."""
+        partner = self.match.of_detection[detections]
+        return np.where(partner >= 0, partner, self.match.booked_on[detections])
 
 
 class _Words:
@@ -242,7 +247,7 @@ class _Words:
         texts[verdict == 3] = graph.detections.reasons_of(part)[verdict == 3]
 
         found = part.start + np.flatnonzero(verdict == 0)
-        own = claims.home[found]
+        own = claims.home(found)
         columns = (graph.reference.ids[own], measures["distance"][found], claims.pieces[own], claims.times[own])
         texts[found - part.start] = [
             f"found reference {name}, shifted {moved:.1f} m"
@@ -251,7 +256,7 @@ class _Words:
         ]
 
         multiple = part.start + np.flatnonzero(verdict == 1)
-        own = claims.home[multiple]
+        own = claims.home(multiple)
         holder = graph.detected.ids[graph.correspondence.of_reference[own]]
         columns = (graph.reference.ids[own], holder, claims.pieces[own], graph.duplicates[multiple])
         texts[multiple - part.start] = [
@@ -264,7 +269,7 @@ class _Words:
 
         wide = part.start + np.flatnonzero((verdict < 2) & (self._of_detection.count[part] > 1))
         for row, own_row, neighbours in zip(
-            wide.tolist(), claims.home[wide].tolist(), self._of_detection.of(wide), strict=True
+            wide.tolist(), claims.home(wide).tolist(), self._of_detection.of(wide), strict=True
         ):
             others = _names(graph.reference.ids[[other for other in neighbours if other != own_row]].tolist())
             texts[row - part.start] += f"; also covers part of reference {others}"
@@ -300,10 +305,10 @@ class _Words:
             others = _names(graph.reference.ids[[other for other in neighbours if other != row]].tolist())
             texts[place] += f"; the detection also covers part of reference {others}"
         shared = np.flatnonzero(self._of_reference.count[rows] > claims.pieces[rows] + claims.times[rows] - 1)
-        for place, row, neighbours in zip(
-            shared.tolist(), rows[shared].tolist(), self._of_reference.of(rows[shared]), strict=True
-        ):
-            strangers = [other for other in neighbours if claims.home[other] != row]
+        covering = self._of_reference.of(rows[shared])
+        homes = iter(claims.home(np.fromiter(itertools.chain(*covering), dtype=np.int64)).tolist())
+        for place, row, neighbours in zip(shared.tolist(), rows[shared].tolist(), covering, strict=True):
+            strangers = [other for other in neighbours if next(homes) != row]
             names = _names(graph.detected.ids[strangers].tolist())
             texts[place] += (
                 f"; detection {names} of another reference covers part of it"
@@ -317,7 +322,7 @@ class _Words:
         nearest = self._of_reference.nearest(rows)
         matched = graph.correspondence.of_detection[nearest] >= 0
         # Without a match only where a detection has a single choice (one-pass matching).
-        home = graph.reference.ids[self._claims.home[nearest]]
+        home = graph.reference.ids[self._claims.home(nearest)]
         columns = (graph.detected.ids[nearest], home, matched, covered)
         return [
             f"merged with reference {other} into detection {name}, which covers {_share(share)} of it"
