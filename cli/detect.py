@@ -135,6 +135,8 @@ def detect(
         if not quiet:
             for note in found.metadata.get("notes", ()):
                 say(f"note: {place.name}: {note}")
+            if found.metadata.get("cues"):
+                say(f"cues used on {place.name}: {', '.join(found.metadata['cues'])}")
             say(f"{output}: {len(found)} footprints on {place.name} in {seconds:.2f} CPU seconds")
     if steps is not None:
         count = _write_steps(chosen, place, seed, steps, overwrite)

@@ -18,8 +18,8 @@ bounds of the steps are our reading: they depend on sensor and season.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -33,6 +33,7 @@ from ...scenes.geodata.outlines import coverage_of_mask, trace
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..base import Detector
+from ..shared.cue_information import ANCHOR, CueInformation, informative_cues
 from ..shared.cues import greenness
 from ..shared.morphology import opened, without_holes
 from ..shared.regularise import regularise
@@ -168,6 +169,10 @@ class DempsterShafer(Detector):
         near_infrared = scene.image is not None and "nir" in scene.image.bands
         cues = cue_maps(points, scene.heights.above(points), grid, window=self.window, vegetation=index)
         probabilities = self._probabilities(cues, near_infrared)
+        information = self._information(probabilities)
+        if information.silent:
+            cues = _without(cues, information.silent)
+            probabilities = self._probabilities(cues, near_infrared)
         evidence, conflict = combined(_evidence(probabilities), grid.shape)
         classes = strongest_class(evidence)
         # A cell to which no evidence at all speaks is soil.
@@ -195,8 +200,21 @@ class DempsterShafer(Detector):
             accepted=accepted,
             traced=traced,
             rejected=trace(coverage_of_mask(regions & ~accepted), grid),
-            footprints=self._footprints(traced, labels, cues, region_support, scene.crs),
+            footprints=replace(
+                self._footprints(traced, labels, cues, region_support, scene.crs),
+                metadata={"cues": ["height", *information.used], "notes": list(information.notes)},
+            ),
         )
+
+    def _information(self, probabilities: dict[str, _Floats]) -> CueInformation:
+        """Return which cues separate roofs from trees among the high cells; the strength of texture is the anchor."""
+        names = {"strength": ANCHOR, "pulse difference": "pulse difference", "vegetation": "vegetation"}
+        # Steps are wide: which side of the middle a probability is on separates more than the probability itself.
+        ratings = {
+            name: np.sign(probabilities[cue] - np.float32(0.5)) for cue, name in names.items() if cue in probabilities
+        }
+        # Texture is a poor expert here: walls are as rough as crowns, and where trees are few it would refute colours.
+        return informative_cues(ratings, probabilities["height"] > 0.5, independent=("vegetation",))
 
     def _step(self, values: NDArray[np.floating] | None, name: str) -> _Floats | None:
         """Return the probability of a cue by the bounds of that name."""
@@ -285,6 +303,15 @@ def _components(mask: _Mask, least: float) -> tuple[NDArray[np.int32], int]:
     large[0] = False
     numbers = np.where(large, np.cumsum(large), 0).astype(np.int32)
     return numbers[labels], int(large.sum())
+
+
+def _without(cues: CueMaps, silent: Collection[str]) -> CueMaps:
+    """Return cue maps without those of silent cues."""
+    return replace(
+        cues,
+        pulse_difference=None if "pulse difference" in silent else cues.pulse_difference,
+        vegetation=None if "vegetation" in silent else cues.vegetation,
+    )
 
 
 def _inner(labels: NDArray[np.int32], count: int, margin: float) -> NDArray[np.int32]:

@@ -18,7 +18,7 @@ knows more than roughness does, so it is not tested by it: it is silent only whe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +61,9 @@ class CueInformation:
         return tuple(f"the cue {name!r} is not used: {reason}" for name, reason in self.silent.items())
 
 
-def informative_cues(ratings: Mapping[str, _Floats], among: NDArray[np.bool_]) -> CueInformation:
+def informative_cues(
+    ratings: Mapping[str, _Floats], among: NDArray[np.bool_], *, independent: Collection[str] = ()
+) -> CueInformation:
     """Return which cues separate roofs from trees, each tested by the others.
 
     The cue of the least separation becomes silent first, and the rest is tested again without it. Where the others
@@ -73,16 +75,19 @@ def informative_cues(ratings: Mapping[str, _Floats], among: NDArray[np.bool_]) -
     ratings : mapping of str to ndarray of float32, shape (rows, columns)
     among : ndarray of bool, shape (rows, columns)
         Cells that are roof or tree.
+    independent : collection of str
+        Cues that know more than the others, which are silent only where they say the same everywhere.
     """
+    untested = _GEOMETRIC | set(independent)
     values = {name: np.where(among, rating, np.float32(np.nan))[among] for name, rating in ratings.items()}
     silent = {name: "the points do not hold it" for name, rating in values.items() if not np.isfinite(rating).any()}
-    for name in _GEOMETRIC - {ANCHOR} - silent.keys():
+    for name in sorted(untested - {ANCHOR} - silent.keys()):
         if name in values and _is_constant(values[name]):
             silent[name] = "it says the same everywhere"
     used = [name for name in values if name not in silent]
     while True:
         tested = {
-            name: _separation(name, {other: values[other] for other in used}) for name in used if name not in _GEOMETRIC
+            name: _separation(name, {other: values[other] for other in used}) for name in used if name not in untested
         }
         failed = {name: found for name, found in tested.items() if found < _LEAST_SEPARATION}
         if not failed or len(used) < 2:

@@ -1,5 +1,7 @@
 """The Dempster-Shafer detector: cue maps on surfaces that are known, and whole scenes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -94,3 +96,15 @@ def test_the_steps_show_every_map():
     assert "texture directedness" in titles
     assert "vegetation" in titles
     assert any("tree or grass" in panel.title for panel in steps[1].panels)
+
+
+def test_a_cue_that_says_the_same_everywhere_is_silent_and_named():
+    scene = rb.make_scene("vaihingen-a-small", seed=1)
+    plain = rb.detect(scene, "dempster-shafer")
+    assert plain.metadata["cues"][0] == "height"
+    assert plain.metadata["notes"] == []
+    grey = replace(scene.image, values=np.full_like(scene.image.values, 90))
+    seen = rb.Scene(scene.name, scene.extent, points=scene.points, dem=scene.dem, image=grey)
+    found = rb.detect(seen, "dempster-shafer")
+    assert found.metadata["cues"] == [cue for cue in plain.metadata["cues"] if cue != "vegetation"]
+    assert "'vegetation' is not used" in found.metadata["notes"][0]
