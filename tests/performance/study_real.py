@@ -13,7 +13,7 @@ of pixel quality that each cause costs (`loss_by_cause`).
 from __future__ import annotations
 
 import argparse
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,7 @@ import shapely
 
 import roofbench as rb
 from roofbench.core.errors import MissingInputError
-from roofbench.detectors.mpp import block_cells, preparation, rows
+from roofbench.detectors.mpp import block_cells, mpp_detector, preparation, rows
 from roofbench.evaluators.threshold_free.causes import CAUSES, loss_by_cause
 from roofbench.scenes.geodata.vector_files import read_footprints
 
@@ -94,11 +94,18 @@ def agreement(found, scene):
 
 
 def run(detector, scenes, seeds):
-    """Return the mean over seeds for each scene on which the detector runs."""
+    """Return the mean over seeds for each scene on which the detector runs.
+
+    A folder in place of a detector holds footprints of another version, SCENE-SEED.gpkg.
+    """
     found = {}
     for name, scene in scenes.items():
         try:
-            outcomes = [scored(rb.detect(scene, detector, seed=seed), scene).numbers for seed in range(seeds)]
+            if Path(detector).is_dir():
+                sets = [read_footprints(file) for file in sorted(Path(detector).glob(f"{name}-[0-9].gpkg"))]
+            else:
+                sets = [rb.detect(scene, detector, seed=seed) for seed in range(seeds)]
+            outcomes = [scored(footprints, scene).numbers for footprints in sets]
         except MissingInputError as error:
             print(f"<!-- {detector} on {name}: {error} -->")
             continue
@@ -131,6 +138,26 @@ def set_to(module, name, value):
         yield
     finally:
         setattr(module, name, before)
+
+
+@contextmanager
+def remembered():
+    """Sample each scene once for all thresholds that only outlines depend on; the ground is filtered once, too."""
+    results = {}
+
+    def keep(name, function, key):
+        def wrapped(*arguments):
+            place = (name, *key(arguments), preparation._LOW_SHARE)
+            if place not in results:
+                results[place] = function(*arguments)
+            return results[place]
+
+        return wrapped
+
+    prepared = keep("prepare", mpp_detector.prepare, lambda given: (given[2].extent, len(given[1])))
+    sampled = keep("sample", mpp_detector.sample_city, lambda given: (id(given[1]), given[2]))
+    with set_to(mpp_detector, "prepare", prepared), set_to(mpp_detector, "sample_city", sampled):
+        yield
 
 
 def ablation(options):
@@ -194,7 +221,7 @@ def pictures(options):
     scenes = opened(options.folders)
     candidates = []
     for name, scene in scenes.items():
-        before = read_footprints(Path(options.before) / f"{name}.gpkg")
+        before = read_footprints(Path(options.before) / f"{name}-0.gpkg")
         after = rb.detect(scene, options.detectors[0], seed=0)
         graph = rb.evaluate(before, scene.reference, area=scene.area).graph
         for k in np.flatnonzero(graph.references.mask):
@@ -244,10 +271,11 @@ def main():
     parser.add_argument("--folders", required=True, type=lambda text: text.split(","), help="scene folders, by commas")
     parser.add_argument("-d", dest="detectors", action="append", help="detector [mpp]")
     parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--before", help="folder with the footprints SCENE.gpkg of another version, for pictures")
+    parser.add_argument("--before", help="folder with the footprints SCENE-0.gpkg of another version")
     options = parser.parse_args()
     options.detectors = options.detectors or ["mpp"]
-    STUDIES[options.study](options)
+    with remembered() if options.study in ("ablation", "leave-one-out") else nullcontext():
+        STUDIES[options.study](options)
 
 
 if __name__ == "__main__":
