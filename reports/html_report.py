@@ -25,6 +25,7 @@ from ..core.output import whole_file
 from ..core.package import VERSION
 from ..evaluators.base import Index
 from .charts import cost_figure, size_figure
+from .curve_charts import curves_figure
 from .format import counted, interval_text, listed, number_text, shortened, unit_text, value_text
 from .gate_text import gate_summary
 from .inline_svg import to_inline_svg
@@ -118,6 +119,7 @@ def _contents(report: Report) -> list[tuple[str, str]]:
         ("worst", "Worst objects", report.errors),
         ("by-scene", "Every scene", report.matrix),
         ("size", "Building size", report.sizes),
+        ("curves", "Curves", report.curves),
         ("sensitivity", "Sensitivity", report.sensitivities),
         ("cost", "Time and memory", report.costs),
         ("gate", "Gate", report.gate),
@@ -341,6 +343,10 @@ def _published(report: Report) -> dict[str, Any] | None:
 
 def _charts(report: Report, level: float) -> dict[str, Any]:
     charts: dict[str, Any] = {"size": None, "cost": None, "gate": None, "sensitivity": []}
+    charts["curves"] = [
+        (found.evaluator, _svg(curves_figure(found), f"curves{place}", f"Curves by {found.evaluator}"))
+        for place, found in enumerate(report.curves)
+    ]
     if report.sizes:
         charts["size"] = _svg(size_figure(report.sizes), "size", "Completeness and correctness by footprint area")
     if report.costs:

@@ -19,6 +19,7 @@ from ..plan import KeyedEvaluator
 from ..store.records import RunRow
 from ..store.writer import Store
 from .leaderboard import make_leaderboard
+from .pooled_curves import pooled_curves
 from .published import PUBLISHED, Comparison, OursRow
 from .report_data import CostPoint, Provenance, Report, Sensitivity
 from .report_scenes import draw_scenes
@@ -133,6 +134,7 @@ def fill_report(
         errors=() if drawn is None else drawn.errors,
         sizes=() if drawn is None else drawn.sizes,
         sampling=() if drawn is None else drawn.sampling,
+        curves=tuple(filter(None, (pooled_curves(store, good, one, _labels(board)) for one, _ in evaluated))),
         sensitivities=tuple(found),
         costs=_costs(store, good, _labels(board)),
         # The printed rows are by the default evaluator: another one's figures do not stand beside them.

@@ -22,7 +22,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...evaluators.base import Index
+from ...evaluators.base import Evaluation, Index
 from ...evaluators.verdict_table import Side, Verdicts
 from ...scenes.geodata.footprints import Footprints
 from ..execution.scene_picture import ScenePicture
@@ -34,6 +34,7 @@ __all__ = [
     "CostPoint",
     "Error",
     "Overlay",
+    "PooledCurves",
     "Provenance",
     "Report",
     "SceneView",
@@ -190,6 +191,25 @@ class Provenance:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class PooledCurves:
+    """Pooled evaluations of several detectors by an evaluator that declares curves.
+
+    Attributes
+    ----------
+    evaluator : str
+        Its name with changed parameters.
+    scenes : tuple of str
+        Those that the evaluations are over.
+    pooled : mapping of str to Evaluation
+        By detector.
+    """
+
+    evaluator: str
+    scenes: tuple[str, ...]
+    pooled: Mapping[str, Evaluation]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Report:
     """The contents of one report; empty parts are not shown.
 
@@ -208,6 +228,7 @@ class Report:
     errors : tuple of Error
         The largest errors.
     sizes : tuple of SizeCurve
+    curves : tuple of PooledCurves
     sensitivities : tuple of Sensitivity
     costs : tuple of CostPoint
     comparison : Comparison, optional
@@ -226,6 +247,7 @@ class Report:
     scenes: tuple[SceneView, ...] = ()
     errors: tuple[Error, ...] = ()
     sizes: tuple[SizeCurve, ...] = ()
+    curves: tuple[PooledCurves, ...] = ()
     sensitivities: tuple[Sensitivity, ...] = ()
     costs: tuple[CostPoint, ...] = ()
     comparison: Comparison | None = None
