@@ -24,6 +24,8 @@ from .package import NAME
 
 __all__ = ["Registry", "nearest_hint", "parse_assignment", "parse_selection", "split_list"]
 
+#: Letters from which on the beginning of a name means the name.
+_LEAST_BEGINNING = 3
 #: Folders of plugins that were named by their file.
 _plugin_folders: set[str] = set()
 
@@ -33,8 +35,15 @@ _OUTSIDE_QUOTES = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')
 
 
 def nearest_hint(name: str, known: Iterable[str]) -> str:
-    """Return ``" (did you mean 'x'?)"`` for the nearest known name, or an empty text."""
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    """Return ``" (did you mean 'x'?)"`` for the nearest known name, or an empty text.
+
+    >>> nearest_hint("ndms", ["mpp", "ndsm"]), nearest_hint("ahn", ["ahn4-bag"]), nearest_hint("x", ["ndsm"])
+    (" (did you mean 'ndsm'?)", " (did you mean 'ahn4-bag'?)", '')
+    """
+    names = list(known)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    # The beginning of a long name is not similar to it by the share of common letters.
+    near = near or [other for other in names if len(name) >= _LEAST_BEGINNING and other.startswith(name)]
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 

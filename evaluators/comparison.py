@@ -85,7 +85,7 @@ def evaluate(
     detected : Footprints, GeoDataFrame, GeoSeries, path, or iterable of polygons
     reference : the same, or Scene
         Both in one projected CRS, metres; bare lists and arrays of polygons are taken in the CRS of the other. A scene
-        gives its reference, evaluation area and pixel grid.
+        (or its folder or name) gives its reference, evaluation area and pixel grid.
     evaluator : str or Evaluator
         Name, ``name[parameter=value]``, or an evaluator; ``"all"`` for every one, see `evaluate_all`.
     area : polygon, optional

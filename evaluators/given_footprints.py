@@ -111,6 +111,14 @@ def given_footprints(value: Any, *, role: str, building_id: str | None = None) -
 
 
 def _given_reference(value: Any, area: Geometry | None, grid: Grid | None, *, building_id: str | None) -> Given:
+    if isinstance(value, str | os.PathLike):
+        from ..scenes.shipped import shipped_or_given
+
+        folder = shipped_or_given(value)
+        if (folder / "scene.toml").is_file():
+            from ..scenes.folder import open_scene
+
+            value = open_scene(folder)
     if not isinstance(value, Footprints) and hasattr(value, "evaluation_grid"):
         if value.reference is None:
             raise InputError(f"the scene {value.name!r} has no reference footprints: give others as reference")

@@ -38,6 +38,7 @@ MISTAKES = [
     ("scenes make knox -p tree_densty=4 -o x", "no parameter 'tree_densty' (did you mean 'tree_density'?)"),
     ("scenes check delf", "(did you mean 'delft'?)"),
     ("scenes fetch ahn4bag", "(did you mean 'ahn4-bag'?)"),
+    ("scenes fetch ahn", "(did you mean 'ahn4-bag'?)"),
     ("sweep ndsm hamlet --vary heigth=1,2", "(did you mean 'height'?)"),
     ("info ndms", "(did you mean 'ndsm'?)"),
     ("detect", "needs DETECTOR (NAME, 'NAME[parameter=value,...]' or FILE.py:CLASS)"),

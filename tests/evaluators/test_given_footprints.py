@@ -73,11 +73,15 @@ def test_footprints_are_drawn_on_given_axes():
     assert len(axes.collections) == 1
 
 
-def test_a_scene_is_a_reference_with_its_grid():
+def test_a_scene_is_a_reference_with_its_grid(tmp_path):
     scene = hamlet(1)
     given = rb.evaluate(scene.reference, scene)
     assert given.to_dict() == rb.evaluate(scene.reference, scene.reference, grid=scene.image.grid).to_dict()
     assert rb.compare(scene.reference, scene.reference, scene).objects["both"] == len(scene.reference)
+    rb.save_scene(scene, tmp_path / "village")
+    assert rb.evaluate(scene.reference, tmp_path / "village").counts.reference == len(scene.reference)
+    delft = rb.open_scene("delft").reference
+    assert rb.evaluate(delft, "delft").counts.reference < len(delft), "by name, with its evaluation area"
     with pytest.raises(InputError, match="has no reference footprints"):
         rb.evaluate(scene.reference, rb.Scene("bare", scene.extent))
 
