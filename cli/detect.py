@@ -67,7 +67,11 @@ def detect(
     ] = None,
     halo: Annotated[
         float | None,
-        typer.Option("--halo", metavar="M", help="Metres around a tile that are seen, too [the detector's own]."),
+        typer.Option(
+            "--halo",
+            metavar="M",
+            help="Width around a tile that the detector also sees, in metres [the detector's own].",
+        ),
     ] = None,
     jobs: JobsOption = 1,
     scheduler: SchedulerOption = None,

@@ -54,7 +54,7 @@ def run(
         ),
     ] = None,
     no_report: Annotated[
-        bool, typer.Option("--no-report", help="Write no report.html, which is else in FOLDER or beside the store.")
+        bool, typer.Option("--no-report", help="Do not write report.html (into FOLDER, else beside the store).")
     ] = False,
     overwrite: OverwriteOption = False,
     index: IndexOption = None,

@@ -36,7 +36,7 @@ def write_sweep_table(table: pd.DataFrame, path: Path, *, overwrite: bool) -> No
         try:
             table.to_parquet(scratch, index=False)
         except ImportError as error:
-            raise OutputError(f"{path}: Parquet needs pyarrow: pip install 'roofbench[parquet]'") from error
+            raise OutputError(f"{path}: Parquet needs pyarrow: pip install pyarrow") from error
 
 
 def break_down_text(found: BreakDown) -> str:

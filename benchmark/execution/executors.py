@@ -69,7 +69,7 @@ def cluster_slot(address: str) -> Iterator[Slot]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise UnsupportedError("scheduler= needs Dask: pip install 'roofbench[dask]'") from error
+        raise UnsupportedError("scheduler= needs Dask: pip install 'dask[distributed]'") from error
     try:
         client = Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:

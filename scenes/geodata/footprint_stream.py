@@ -154,7 +154,7 @@ def _arrow() -> Any:
     try:
         import pyarrow
     except ImportError as missing:
-        raise UnsupportedError("reading files in parts needs pyarrow: pip install 'roofbench[parquet]'") from missing
+        raise UnsupportedError("reading files in parts needs pyarrow: pip install pyarrow") from missing
     return pyarrow
 
 

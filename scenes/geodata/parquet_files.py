@@ -76,5 +76,5 @@ def _support(file: Path, error: type[InputError] | type[OutputError]) -> Any:
         import geopandas
         import pyarrow.parquet  # noqa: F401
     except ImportError as missing:
-        raise error(f"{file.name}: GeoParquet needs pyarrow: pip install 'roofbench[parquet]'") from missing
+        raise error(f"{file.name}: GeoParquet needs pyarrow: pip install pyarrow") from missing
     return geopandas

@@ -60,7 +60,7 @@ def cloth_surface(
         import CSF
     except ImportError as error:
         raise ParameterError(
-            "the cloth simulation filter is not installed: pip install 'roofbench[ground]', or use opening"
+            "the cloth simulation filter is not installed: pip install cloth-simulation-filter, or use opening"
         ) from error
     lowest = points.take(_lowest_points(points, Grid.covering(extent, _THINNED)))
     cloth = CSF.CSF()

@@ -12,7 +12,7 @@ import shapely
 from affine import Affine
 
 import roofbench as rb
-from roofbench.benchmark.suite import read_suite
+from roofbench.benchmark.suite import named_suite
 from roofbench.core.package import FOLDER
 
 __all__ = ["FILES"]
@@ -63,7 +63,7 @@ def tiles(folder: Path) -> None:
 def programs(folder: Path) -> None:
     """Write the footprints that somebody made for the scenes of the suite ``quick``, one file each, moved by 0.5 m."""
     (folder / "mine").mkdir()
-    for recipe in read_suite("quick").scenes:
+    for recipe in named_suite("quick").scenes:
         reference = recipe.open().reference
         moved = shapely.transform(reference.polygons, lambda xy: xy + 0.5)
         rb.write_footprints(rb.Footprints.of(moved, crs=reference.crs), folder / "mine" / f"{recipe.name}.gpkg")
@@ -81,8 +81,7 @@ def suite(folder: Path) -> None:
     page = (FOLDER / "docs" / "guide" / "running.md").read_text(encoding="utf-8")
     (folder / "my-city.toml").write_text(page.partition("```toml\n")[2].partition("```")[0])
     rb.save_scene(rb.open_scene(_DELFT.parent / "ign"), folder / "centre")
-    (folder / "plugins").mkdir()
-    plugin(folder / "plugins")
+    plugin(folder)
 
 
 FILES = {"two-sets": two_sets, "tiles": tiles, "programs": programs, "plugin": plugin, "suite": suite}

@@ -23,7 +23,7 @@ from roofbench.core.processes import Limits
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 
-distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'roofbench[dask]'")
+distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'dask[distributed]'")
 pytestmark = pytest.mark.filterwarnings("ignore")  # warnings of Dask and Tornado are theirs
 
 
