@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError, OutputError, RoofbenchError
 from ...core.package import FOLDER, VERSION
 from ...core.tasks import run_tasks
+from ...scenes.geodata.common_place import Extent, extent_warnings
 from ...scenes.geodata.crs import common_crs
 from ...scenes.geodata.footprint_stream import FootprintStream, open_stream
 from ...scenes.geodata.footprints import Footprints
@@ -59,6 +60,15 @@ class FileStores:
         """Return the name and the repairs of a file, as a set of no footprints."""
         repairs = tuple(Repair(*entry) for entry in self.stores[place].facts["repairs"])
         return replace(Footprints.empty(source=str(self.streams[place].file)), repairs=repairs)
+
+    def warnings(self) -> list[str]:
+        """Return signs that the last file, the reference, is of another place than one of the others."""
+        extents = [
+            Extent(store.facts["bounds"], stream.crs, str(stream.file))
+            for store, stream in zip(self.stores, self.streams, strict=True)
+        ]
+        found = [warning for other in extents[:-1] for warning in extent_warnings(other, extents[-1])]
+        return list(dict.fromkeys(found))
 
     def repaired(self, place: int) -> frozenset[int]:
         """Return the features of a file whose outlines were repaired."""
@@ -138,7 +148,10 @@ def store_files(
     else:
         for task in tasks:
             _read_side(task)
-    return FileStores(tuple(streams), tuple(stores), work)
+    files = FileStores(tuple(streams), tuple(stores), work)
+    for warning in files.warnings():
+        say(warning)
+    return files
 
 
 def _key(streams: Sequence[FootprintStream], division: Division) -> str:
@@ -187,17 +200,21 @@ def _read_side(task: _Task) -> None:
     store = OutlineStore(task.folder, task.division)
     labels: list[Any] = []
     repairs: list[Repair] = []
+    corners: list[NDArray[np.float64]] = []
 
     def batches() -> Iterator[OutlineBatch]:
         for outlines, own in stream.outlines():
             labels.append(own)
             repairs.extend(outlines.repairs)
+            if len(outlines):
+                corners.extend([np.nanmin(outlines.points, axis=0), np.nanmax(outlines.points, axis=0)])
             yield outlines
 
     store.write(batches())
     codes = None if stream.building_id is None or not labels else _building_codes(labels)
     entries = [[repair.id, repair.problem, repair.action] for repair in repairs]
-    store.finish(codes, source=str(stream.file), repairs=entries)
+    bounds = [*np.min(corners, axis=0).tolist(), *np.max(corners, axis=0).tolist()] if corners else None
+    store.finish(codes, source=str(stream.file), repairs=entries, bounds=bounds)
 
 
 @contextmanager

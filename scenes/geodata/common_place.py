@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import shapely
 
 from .crs import scale_warning
 from .footprints import Footprints
 
-__all__ = ["place_warnings", "reaches"]
+__all__ = ["Extent", "extent_warnings", "place_warnings", "reaches"]
+
+
+class Extent(NamedTuple):
+    """Bounds of some footprints (xmin, ymin, xmax, ymax, m; None of none), their CRS and their name in messages."""
+
+    bounds: tuple[float, float, float, float] | None
+    crs: str | None
+    source: str
 
 
 def place_warnings(detected: Footprints, reference: Footprints) -> list[str]:
     """Return warnings in words: no overlap of the two extents, or a CRS in which areas are far from true ones."""
-    boxes = [shapely.total_bounds(footprints.polygons) for footprints in (detected, reference) if len(footprints)]
+    return extent_warnings(*(_extent(footprints) for footprints in (detected, reference)))
+
+
+def extent_warnings(detected: Extent, reference: Extent) -> list[str]:
+    """Return warnings in words; see `place_warnings`."""
+    boxes = [np.array(side.bounds) for side in (detected, reference) if side.bounds is not None]
     if not boxes:
         return []
     warnings = []
@@ -26,6 +41,11 @@ def place_warnings(detected: Footprints, reference: Footprints) -> list[str]:
         )
     stretched = scale_warning(reference.crs or detected.crs, *((boxes[-1][:2] + boxes[-1][2:]) / 2))
     return [*warnings, stretched] if stretched else warnings
+
+
+def _extent(footprints: Footprints) -> Extent:
+    bounds = tuple(shapely.total_bounds(footprints.polygons).tolist()) if len(footprints) else None
+    return Extent(bounds, footprints.crs, footprints.source)
 
 
 def reaches(area: shapely.Geometry | None, footprints: Footprints) -> bool:

@@ -71,13 +71,16 @@ def _centroids(start: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray
     origin = np.full((len(counts), 2), np.nan)
     origin[some] = points[start[:-1][some]]
     # Coordinates from the first vertex keep all digits however far the scene is from the origin of its CRS.
-    x, y = (points - np.repeat(origin, counts, axis=0)).T
+    x, y = (points[:, axis] - np.repeat(origin[:, axis], counts) for axis in range(2))
+    gaps = np.flatnonzero(np.isnan(x))
+    x[gaps] = y[gaps] = 0.0  # between two rings: edges to the origin have no turn
     turn = x[:-1] * y[1:] - x[1:] * y[:-1]
-    moments = np.stack([turn, turn * (x[:-1] + x[1:]), turn * (y[:-1] + y[1:])], axis=1)
-    moments[np.isnan(turn)] = 0.0  # between two rings
-    moments[start[1:-1][counts[:-1] > 0] - 1] = 0.0  # between two footprints
-    sums = np.zeros((len(counts), 3))
-    sums[some] = np.add.reduceat(moments, start[:-1][some], axis=0)
+    turn[start[1:-1][counts[:-1] > 0] - 1] = 0.0  # between two footprints
+    begin = start[:-1][some]
+    sums = np.zeros((3, len(counts)))
+    sums[0, some] = np.add.reduceat(turn, begin)
+    for axis, along in enumerate((x, y)):
+        sums[axis + 1, some] = np.add.reduceat(turn * (along[:-1] + along[1:]), begin)
     with np.errstate(divide="ignore", invalid="ignore"):
-        centroids: NDArray[np.float64] = origin + sums[:, 1:] / (3 * sums[:, :1])
+        centroids: NDArray[np.float64] = origin + (sums[1:] / (3 * sums[0])).T
     return centroids

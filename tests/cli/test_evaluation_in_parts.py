@@ -112,6 +112,15 @@ def test_two_detections_are_compared_in_parts(files):
     assert "--plot needs whole files in memory" in " ".join(refused.stderr.split())
 
 
+def test_files_of_two_places_are_named(files):
+    houses = [shapely.affinity.translate(house, 9e4, 0) for house in rb.read_footprints(files / "r.fgb").polygons]
+    rb.write_footprints(rb.Footprints.of(houses, crs="EPSG:25832"), files / "far.gpkg")
+    answers = [roofbench("evaluate", "d.gpkg", "far.gpkg", *more, folder=files) for more in ([], ["--parts", "2"])]
+    for answer in answers:
+        assert "d.gpkg lies in x" in answer.stderr
+        assert "no overlap at all, check the CRS" in answer.stderr
+
+
 def test_a_cluster_gives_the_same_bits(files):
     distributed = pytest.importorskip("distributed")
     here = roofbench("evaluate", "d.gpkg", "r.fgb", "--parts", "5", "-f", "json", "--verdicts", "a.fgb", folder=files)

@@ -10,6 +10,7 @@ Measured in a process of its own, one after the other:
 
 - *bare*: ``STRtree(reference).query(detected)``, then ``area(intersection(...))`` of the pairs found;
 - *verdicts*: from the same arrays of polygons to all indices and to the verdict of each object;
+- *work*: the ratio of processor seconds, which other programs disturb less; two threads use more of them at a time;
 - *frames*: from there to the two data frames, with the reason of each verdict in words.
 
 The whole-process rows time ``roofbench evaluate`` on GeoJSON files, interpreter start and imports included, and the
@@ -71,20 +72,23 @@ def measure(count, shape):
     detected, reference, building = city(count, shape=shape)
     small = city(1000, shape=shape)
     assert rb.evaluate(rb.Footprints.of(small[0]), rb.Footprints.of(small[1])).verdicts  # imports are not timed
-    clock = time.perf_counter()
+    clock, work = time.perf_counter(), time.process_time()
     found, wanted = shapely.STRtree(reference).query(detected)
     shapely.area(shapely.intersection(detected[found], reference[wanted])).sum()
-    bare = time.perf_counter() - clock
-    clock = time.perf_counter()
+    bare, bare_work = time.perf_counter() - clock, time.process_time() - work
+    clock, work = time.perf_counter(), time.process_time()
     evaluation = rb.evaluate(rb.Footprints.of(detected), rb.Footprints.of(reference, building_ids=building))
     verdicts = evaluation.verdicts
-    seconds = time.perf_counter() - clock
+    seconds, own_work = time.perf_counter() - clock, time.process_time() - work
     assert len(verdicts.detection_table) == count
     frames = verdicts.detections, verdicts.references
     total = time.perf_counter() - clock
     assert len(frames[0]) == count
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    return {"bare": bare, "verdicts": seconds, "ratio": seconds / bare, "frames": total, "peak": peak}
+    return {"bare": bare, "verdicts": seconds, "ratio": seconds / bare, "work": own_work / bare_work} | {
+        "frames": total,
+        "peak": peak,
+    }
 
 
 def in_own_process(*arguments):
@@ -123,7 +127,7 @@ def main():
     if options.one:
         print(json.dumps(measure(options.one, options.shape)))
         return
-    columns = ("bare", "verdicts", "ratio", "frames", "peak")
+    columns = ("bare", "verdicts", "ratio", "work", "frames", "peak")
     print(f"{options.shape}, seconds and GB, median of {options.repeats}")
     print(" ".join(f"{name:>10}" for name in ("size", *columns)))
     for size in options.sizes.split(","):

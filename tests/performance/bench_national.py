@@ -9,17 +9,19 @@ million footprints). Measured in processes of their own, one after the other:
   indices, no verdicts (where `sedonadb` is installed);
 - *evaluate*: ``roofbench evaluate --parts`` with the verdicts of all objects as GeoParquet.
 
-Seconds are wall time; *processor* counts those of all processes and threads; memory is that of the largest process.
+Seconds are wall time; *processor* counts those of all processes and threads; memory is that of all processes together.
 Each row is added to ``measured.json`` in the folder; ``--plot FILE`` draws them.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -66,16 +68,31 @@ def write_cities(count, folder):
     return [str(path) for path in paths]
 
 
-def measured(*command):
-    """Return wall seconds, processor seconds and the peak memory (GB) of a command."""
+def measured(command, *, environment=None):
+    """Return what a command printed or its last line of error, and its seconds, processor seconds and memory (GB).
+
+    The memory is the largest sum over the process and its children, looked at five times a second, or the peak of the
+    largest one, whichever is more.
+    """
+    import psutil
+
     clock = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.PIPE)
-    process.stdout.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    seconds = time.perf_counter() - clock
-    if status:
-        raise SystemExit(f"{' '.join(command)} failed")
-    return seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 2**20
+    with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
+        process = subprocess.Popen(command, stdout=output, stderr=errors, env=environment)
+        most, ended, status, usage = 0, 0, 0, None
+        while not ended:
+            ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+            with contextlib.suppress(psutil.Error):
+                own = psutil.Process(process.pid)
+                most = max(most, sum(each.memory_info().rss for each in (own, *own.children(recursive=True))))
+            time.sleep(0 if ended else 0.2)
+        seconds = time.perf_counter() - clock
+        output.seek(0)
+        errors.seek(0)
+        said = output.read().strip() if not status else f"failed: {errors.read().strip().splitlines()[-1:]}"
+    processor = usage.ru_utime + usage.ru_stime
+    memory = max(usage.ru_maxrss / 2**20, most / 2**30)
+    return {"said": said, "seconds": seconds, "processor": processor, "memory": memory}
 
 
 def plotted(rows, file):
@@ -125,10 +142,13 @@ def main():
         if not options.no_join:
             runs = {"join": [sys.executable, "-c", _JOIN, *paths]} | runs
         for what, command in runs.items():
-            seconds, processor, memory = measured(*command)
-            rows.append({"size": size, "what": what, "seconds": seconds, "processor": processor, "memory": memory})
+            found = measured(command)
+            if found["said"].startswith("failed"):
+                raise SystemExit(f"{what}: {found['said']}")
+            rows.append({"size": size, "what": what} | found)
             record.write_text(json.dumps(rows))
-            print(f"{size:>10,} {what:>9} {seconds:>8.1f} {processor:>9.1f} {memory:>6.2f}", flush=True)
+            figures = f"{found['seconds']:>8.1f} {found['processor']:>9.1f} {found['memory']:>6.2f}"
+            print(f"{size:>10,} {what:>9} {figures}", flush=True)
 
 
 if __name__ == "__main__":

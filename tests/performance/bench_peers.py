@@ -26,8 +26,9 @@ import os
 import subprocess
 import sys
 import sysconfig
-import time
 from pathlib import Path
+
+from bench_national import measured
 
 PROGRAMS = {
     "sedonadb": """
@@ -100,21 +101,6 @@ print(f"{faster_coco_eval.__version__}: AP {run.stats[0]:.4f}, {len(images)} chi
 }
 
 
-def measured(command):
-    """Return what a command printed, or its last line of error, and seconds, processor seconds and memory, GB."""
-    clock = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment())
-    output, errors = process.stdout.read(), process.stderr.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    seconds = time.perf_counter() - clock
-    return {
-        "said": output.strip() if not status else f"failed: {errors.strip().splitlines()[-1:]}",
-        "seconds": seconds,
-        "processor": usage.ru_utime + usage.ru_stime,
-        "memory": usage.ru_maxrss / 2**20,
-    }
-
-
 def summary(answer):
     """Return version, true positives and object quality of the answer of roofbench."""
     import roofbench
@@ -159,7 +145,7 @@ def main():
             if size <= most.get(tool, size):
                 commands[tool] = [python, "-W", "ignore", "-c", program, *paths]
         for tool, command in commands.items():
-            row = {"size": size, "tool": tool, **measured(command)}
+            row = {"size": size, "tool": tool, **measured(command, environment=environment())}
             if tool == "roofbench":
                 row["said"] = summary(row["said"])
             rows.append(row)
