@@ -1,6 +1,7 @@
 """Print the summary of a nightly run as Markdown: parts with result and time, and tests counted by kind.
 
-Arguments: the folder in which ``.ci/nightly`` keeps ``parts.txt`` and one JUnit file for each part with tests.
+Arguments: the folder in which ``.ci/nightly`` keeps ``parts.txt`` and one JUnit file for each part with tests; optionally
+a page, ``docs/reference/reliability.md``, into which the summary is written between its two markers.
 """
 
 import platform
@@ -84,4 +85,10 @@ def summary(folder: Path) -> str:
 
 
 if __name__ == "__main__":
-    print(summary(Path(sys.argv[1])), end="")
+    text = summary(Path(sys.argv[1]))
+    if len(sys.argv) > 2:
+        page = Path(sys.argv[2])
+        before, start, rest = page.read_text(encoding="utf-8").partition("<!-- nightly summary -->\n")
+        end = rest.index("<!-- end -->")
+        page.write_text(before + start + text + rest[end:], encoding="utf-8")
+    print(text, end="")

@@ -79,6 +79,9 @@ def main() -> None:
         _print_error(f"{error.filename or 'the output'}: {error.strerror or error}")
         _close_stdout()
         sys.exit(2)
+    except MemoryError as error:
+        _print_error(f"the memory does not suffice: {error or 'a file is too large for this machine'}")
+        sys.exit(2)
     except Exception as error:
         import sqlite3  # here, since evaluate has no store
 
