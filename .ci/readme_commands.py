@@ -1,6 +1,6 @@
 """Run the commands and the Python of README.md as a new user would: a fresh clone, an empty virtual environment.
 
-Argument: a folder that does not exist yet. Blocks that are marked as not run are left out. Exit code 1 if one fails.
+Argument: a folder that does not exist yet. The block with the test command is left out. Exit code 1 if one fails.
 """
 
 import os
@@ -11,8 +11,7 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-#: Fenced blocks with the comment before them, if there is one.
-BLOCK = re.compile(r"(?:<!-- (?P<mark>[^\n]*) -->\n)?```(?P<kind>sh|python)\n(?P<text>.*?)```", re.DOTALL)
+BLOCK = re.compile(r"```(?P<kind>sh|python)\n(?P<text>.*?)```", re.DOTALL)
 #: The two files that the README compares.
 FILES = """
 import geopandas
@@ -39,11 +38,8 @@ def main() -> int:
         "PATH": f"{environment / 'bin'}{os.pathsep}{kept['PATH']}",
         "NUMBA_CACHE_DIR": str(place / "c"),
     }
-    blocks = [
-        found
-        for found in BLOCK.finditer((clone / "README.md").read_text(encoding="utf-8"))
-        if not (found["mark"] or "").startswith(("not run", "test command"))
-    ]
+    text = (clone / "README.md").read_text(encoding="utf-8")
+    blocks = [found for found in BLOCK.finditer(text) if "'.[test]'" not in found["text"]]
     steps = [(found["kind"], found["text"]) for found in blocks]
     installed = next(number for number, (_, text) in enumerate(steps) if "pip install" in text)
     steps.insert(installed + 1, ("python", FILES))

@@ -1,7 +1,7 @@
 """Print the summary of a nightly run as Markdown: parts with result and time, and tests counted by kind.
 
-Arguments: the folder in which ``.ci/nightly`` keeps ``parts.txt`` and one JUnit file for each part with tests; optionally
-a page, ``docs/reference/reliability.md``, into which the summary is written between its two markers.
+Arguments: the folder in which ``.ci/nightly`` keeps ``parts.txt`` and one JUnit file for each part with tests;
+optionally a page, ``docs/reference/reliability.md``, into which the summary is written between its two markers.
 """
 
 import platform
