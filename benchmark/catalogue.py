@@ -105,7 +105,7 @@ def entries_of(name: str) -> list[Entry]:
         try:
             plugin = find_plugin(name)
         except ParameterError:
-            if word != name:
+            if word != name or ".py" in word:
                 raise
             return [_plugin_entry(word, detector=word in DETECTORS.names())]  # it cannot be made without parameters
         return [_described(plugin, name=name if ".py" in word else word)]

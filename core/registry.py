@@ -132,10 +132,14 @@ class Registry:
         )
 
     def add(self, plugin: type[Any]) -> type[Any]:
-        """Add a class under its ``name``; a name that is taken by another class is refused."""
+        """Add a class under its ``name``; a name that is taken by another class is refused.
+
+        A class of an installed package may be added from its file as well, as tests of the package do.
+        """
         plugin = self._checked(plugin, plugin.__name__)
         name: str = plugin.name
-        taken = name in self._builtin or name in self._entry_points()
+        installed = self._entry_points().get(name)
+        taken = name in self._builtin or (installed is not None and not _same_source(installed.load(), plugin))
         other = self._added.get(name)
         if taken or (other is not None and _origin(other) != _origin(plugin)):
             raise ParameterError(f"a {self.kind} called {name!r} exists already: give {plugin.__name__} another name")
@@ -172,7 +176,10 @@ class Registry:
 
     def _checked(self, plugin: Any, name: str) -> type[Any]:
         if not (isinstance(plugin, type) and issubclass(plugin, self._base)):
-            raise ParameterError(f"{name} is not a {self.kind}: it must derive from roofbench.{self._base.__name__}")
+            article = "an" if self.kind[0] in "aeiou" else "a"
+            raise ParameterError(
+                f"{name} is not {article} {self.kind}: it must derive from roofbench.{self._base.__name__}"
+            )
         if not isinstance(getattr(plugin, "name", None), str):
             raise ParameterError(f"{name} has no name: set the class attribute 'name'")
         return plugin
@@ -182,6 +189,15 @@ class Registry:
 def _installed(group: str) -> dict[str, importlib.metadata.EntryPoint]:
     """Return the entry points of a group; the search reads a file of every installed package, so it is done once."""
     return {entry.name: entry for entry in importlib.metadata.entry_points(group=group)}
+
+
+def _same_source(one: type[Any], two: type[Any]) -> bool:
+    """Return whether two classes have one name and the same source file, or copies of it."""
+    files = [getattr(sys.modules.get(plugin.__module__), "__file__", None) for plugin in (one, two)]
+    if one.__qualname__ != two.__qualname__ or not all(files):
+        return False
+    contents = [Path(str(file)).read_bytes() for file in files]
+    return contents[0] == contents[1]
 
 
 def _origin(plugin: type[Any]) -> tuple[str, str]:

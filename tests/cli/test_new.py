@@ -65,6 +65,15 @@ def test_the_plugins_of_an_installed_package_are_found_by_name(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, env=environment)
     assert done.stdout.splitlines()[0] == "OwnTools(height=3.0) OwnToolsScore()", done.stderr
     assert int(done.stdout.splitlines()[1]) > 0
+    # The tests of the package name the detector by its file, which is installed now.
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+    other = tmp_path / "other.py"
+    other.write_text((folder / "src" / "own_tools" / "detector.py").read_text() + "# changed\n")
+    command = [sys.executable, "-m", "roofbench", "info", f"{other}:OwnTools"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment)
+    assert "a detector called 'own-tools' exists already" in done.stderr
 
 
 def test_a_new_detector_gets_on_the_leaderboard(tmp_path):
