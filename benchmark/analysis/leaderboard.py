@@ -289,7 +289,8 @@ def _stability(boards: Sequence[_Tally], index: Index) -> list[str]:
         f"{board.label} in {count}" for board, count in zip(boards[1:], counts[1:].tolist(), strict=True) if count
     ]
     text = (
-        f"{boards[0].label} is first by mean {index.title} in {counts[0]} of {HALF_SPLITS} random halves of the scenes"
+        f"{boards[0].label} is first by mean {index.title.removeprefix('mean ')} in {counts[0]} of {HALF_SPLITS} "
+        "random halves of the scenes"
     )
     text = f"{text}; {', '.join(others)}" if others else text
     # Else the reader wonders why another detector has the first rank.
