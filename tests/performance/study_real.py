@@ -155,8 +155,8 @@ def remembered():
         return wrapped
 
     prepared = keep("prepare", mpp_detector.prepare, lambda given: (given[2].extent, len(given[1])))
-    sampled = keep("sample", mpp_detector.sample_city, lambda given: (id(given[1]), given[2]))
-    with set_to(mpp_detector, "prepare", prepared), set_to(mpp_detector, "sample_city", sampled):
+    sampled = keep("sample", mpp_detector.sample_scene, lambda given: (id(given[1]), given[2]))
+    with set_to(mpp_detector, "prepare", prepared), set_to(mpp_detector, "sample_scene", sampled):
         yield
 
 
@@ -215,8 +215,9 @@ def merit(outcomes, left_out):
 
 
 def pictures(options):
-    """Draw the references on which the footprints of ``--before`` lose most, with those of now beside them."""
+    """Draw the two references a scene on which the footprints of ``--before`` lose most, with those of now."""
     from matplotlib.figure import Figure
+    from PIL import Image as Picture
 
     scenes = opened(options.folders)
     candidates = []
@@ -224,15 +225,19 @@ def pictures(options):
         before = read_footprints(Path(options.before) / f"{name}-0.gpkg")
         after = rb.detect(scene, options.detectors[0], seed=0)
         graph = rb.evaluate(before, scene.reference, area=scene.area).graph
-        for k in np.flatnonzero(graph.references.mask):
-            candidates.append((lost(graph, k), name, k, before, after))
-    candidates.sort(key=lambda one: -one[0])
+        counted = np.flatnonzero(graph.references.mask)
+        worst = sorted(counted, key=lambda k, graph=graph: -lost(graph, k))[:2]
+        candidates += [(name, k, before, after) for k in worst]
     figure = Figure(figsize=(15, 6.4), layout="constrained")
     panels = figure.subplots(2, 5).ravel()
-    for panel, (_, name, k, before, after) in zip(panels, candidates, strict=False):
+    for panel, (name, k, before, after) in zip(panels, candidates, strict=False):
         draw(panel, scenes[name], k, before, after)
         panel.set_title(name, fontsize=9)
-    figure.savefig(IMAGES / "real-scenes-worst.png", dpi=80)
+    file = IMAGES / "real-scenes-worst.png"
+    figure.savefig(file, dpi=80)
+    with Picture.open(file) as picture:
+        few = picture.convert("RGB").quantize(160, method=Picture.Quantize.MAXCOVERAGE, dither=Picture.Dither.NONE)
+    few.save(file, optimize=True)
 
 
 def lost(graph, k):
