@@ -18,7 +18,7 @@ from .options import DetectorOption, FormatOption, IndicesOption, OverwriteOptio
 
 if TYPE_CHECKING:
     from ..benchmark.analysis.self_test import SelfTest
-    from ..benchmark.suite import DetectorEntry, Suite
+    from ..benchmark.suite import Suite
 
 __all__ = ["gate"]
 
@@ -168,6 +168,7 @@ def _write(path: Path | None, overwrite: bool, text: str) -> None:
 def _self_test(suite: Suite, options: RunOptions, **how: Any) -> SelfTest:
     """Measure a suite twice with different seeds, the second time without stored results, and test the gate on it."""
     from ..benchmark.analysis.self_test import self_test
+    from ..benchmark.suite import DetectorEntry
 
     console = messages(options.quiet)
     first, _ = measure_suite(suite, options, console)
