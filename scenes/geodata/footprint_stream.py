@@ -65,7 +65,8 @@ class FootprintStream:
         if self.layer is None:
             import pyarrow.parquet
 
-            with plain_path(self.file) as path, pyarrow.parquet.ParquetFile(path) as source:
+            # Without pre_buffer=False pyarrow keeps what it has read of a file until the end.
+            with plain_path(self.file) as path, pyarrow.parquet.ParquetFile(path, pre_buffer=False) as source:
                 yield from source.iter_batches(_BATCH, columns=[self.geometry, *columns])
             return
         import pyogrio.raw
