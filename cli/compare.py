@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -43,6 +44,14 @@ def compare(
     interval: Annotated[
         float, typer.Option("--interval", metavar="PERCENT", help="Level of the intervals of the differences.")
     ] = 95.0,
+    reference_error: Annotated[
+        float | None,
+        typer.Option(
+            "--reference-error",
+            metavar="M",
+            help="Redraw the reference with this digitising error, and print how far each difference moves.",
+        ),
+    ] = None,
     form: Annotated[Literal["table", "json", "csv", "md"], typer.Option("--format", "-f", help=FORMAT_HELP)] = "table",
     verdicts: Annotated[
         Path | None,
@@ -66,6 +75,7 @@ def compare(
     from ..core.errors import InputError, ParameterError, UnsupportedError
     from ..evaluators.registry import ALL, DEFAULT, make_evaluator
     from ..evaluators.uncertainty.paired import compare as compared
+    from ..evaluators.uncertainty.redrawn import redraw_differences, require_error
     from ..reports.pair_text import format_pair
     from ..reports.verdict_outputs import check_targets
     from ..scenes.geodata.vector_files import read_footprints
@@ -74,9 +84,16 @@ def compare(
         raise ParameterError("two detections are compared by one evaluator at a time: name it by evaluator=")
     if building_id is not None and join_gaps is not None:
         raise InputError("blocks of joined footprints have no building ids: set building_id= or join_gaps=, not both")
+    if reference_error is not None:
+        require_error(reference_error)
     check_targets(verdicts, plot, inputs=(first, second, reference, evaluation_area), overwrite=overwrite)
     names = (short_name(first), short_name(second), short_name(reference))
-    whole = {"evaluation_area=": evaluation_area, "join_gaps=": join_gaps, "plot=": plot}
+    whole = {
+        "evaluation_area=": evaluation_area,
+        "join_gaps=": join_gaps,
+        "reference_error=": reference_error,
+        "plot=": plot,
+    }
     needs = [name for name, value in whole.items() if value is not None]
     asked = "parts=" if parts is not None else "scheduler=" if scheduler is not None else None
     if asked and needs:
@@ -101,6 +118,12 @@ def compare(
         grid=truth.grid,
         interval=interval,
     )
+    if reference_error is not None:
+        sets = one, two, truth.footprints
+        redrawn = redraw_differences(
+            *sets, error=reference_error, evaluator=found.evaluator, area=truth.area, grid=truth.grid
+        )
+        found = replace(found, redrawn=redrawn)
     if found.fates is None and (verdicts is not None or plot is not None):
         raise UnsupportedError(
             f"the evaluator {found.evaluator.name!r} gives no verdicts: leave out verdicts= and plot="

@@ -39,9 +39,12 @@ def format_pair(found: PairedComparison, form: Form, *, names: tuple[str, str, s
         content = {**dict(zip(("a", "b", "reference"), names, strict=True)), **found.to_dict()}
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     if form == "csv":
-        heads = ("key", "index", "a", "b", "difference", "low", "high", "conclusion")
+        heads = ["key", "index", "a", "b", "difference", "low", "high", "conclusion"]
+        changes = {} if found.redrawn is None else found.redrawn.changes
+        heads += ["redrawn"] if changes else []
         rows = (
             (d.index.key, d.index.title, d.first, d.second, d.difference, *(d.ends or (None, None)), d.conclusion)
+            + ((changes[d.index.key],) if changes else ())
             for d in found.differences
         )
         return Table.of(map(Column, heads), rows).to_csv().rstrip("\n")
@@ -83,6 +86,7 @@ def differences_table(found: PairedComparison, chosen: Iterable[Difference]) -> 
     columns = [
         Column("index", "left"),
         *(Column(title) for title in ("A", "B", "B − A", f"{found.level:g} %")),
+        *([] if found.redrawn is None else [Column(f"redrawn ±{found.redrawn.error:g} m")]),
         Column("conclusion", "left"),
     ]
     rows = []
@@ -95,6 +99,11 @@ def differences_table(found: PairedComparison, chosen: Iterable[Difference]) -> 
                 *(number_text(value, unit, fine=True) for value in (one.first, one.second)),
                 number_text(one.difference, unit, fine=True, signed=True),
                 interval_text(low, high, unit, fine=True, signed=True),
+                *(
+                    []
+                    if found.redrawn is None
+                    else [number_text(found.redrawn.changes[one.index.key], unit, fine=True)]
+                ),
                 one.conclusion,
             )
         )
@@ -108,6 +117,15 @@ def _notes(found: PairedComparison, *, markdown: bool) -> list[str]:
         if found.blocks > 1
         else "no intervals: they need two connected groups of footprints or more"
     )
+    redrawn = (
+        ()
+        if found.redrawn is None
+        else (
+            f"redrawn: 95 % of {found.redrawn.redraws} redraws of the reference, its corners moved by "
+            f"±{found.redrawn.error:g} m, change the difference by no more than this; "
+            "a smaller difference is not believed",
+        )
+    )
     evaluations = (("A", found.first), ("B", found.second))
-    notes = [how, *(f"{name}: {note}" for name, evaluation in evaluations for note in evaluation.notes)]
+    notes = [how, *redrawn, *(f"{name}: {note}" for name, evaluation in evaluations for note in evaluation.notes)]
     return [f"- {escaped_markdown(note)}" if markdown else f"Note: {note}" for note in notes]

@@ -35,6 +35,7 @@ from ..registry import DEFAULT, make_evaluator
 from ..verdict_table import VerdictKind, VerdictTable
 from .blocks import Blocks, spatial_blocks
 from .intervals import RESAMPLES, Interval, block_tallies, interval_of, require_level, resampled_values
+from .redrawn import Redraws
 
 __all__ = ["FATES", "Difference", "Fate", "PairedComparison", "compare", "fates_of", "mcnemar_p", "paired"]
 
@@ -100,6 +101,8 @@ class PairedComparison(Displayed):
         Percent.
     blocks, groups, resamples : int
         Of the paired bootstrap.
+    redrawn : Redraws, optional
+        How far the differences move when the reference is redrawn.
     """
 
     shown_by = "reports.notebook_view:pair_view"
@@ -112,6 +115,7 @@ class PairedComparison(Displayed):
     blocks: int
     groups: int
     resamples: int
+    redrawn: Redraws | None = None
 
     def __repr__(self) -> str:
         objects = ", ".join(f"{number} {fate}" for fate, number in self.objects.items() if number)
@@ -168,6 +172,7 @@ class PairedComparison(Displayed):
             "blocks": self.blocks,
             "connected_groups": self.groups,
             "resamples": self.resamples,
+            **({} if self.redrawn is None else {"reference_error": self.redrawn.to_dict()}),
             "differences": {
                 found.index.key: {
                     "a": found.first,

@@ -23,7 +23,7 @@ from ..base import Evaluator
 from ..given_footprints import GivenFootprints, GivenReference, given_sets
 from ..registry import DEFAULT, make_evaluator
 
-__all__ = ["REDRAWS", "Redraws", "changes_of", "redraw", "redraw_changes", "require_error"]
+__all__ = ["REDRAWS", "Redraws", "changes_of", "redraw", "redraw_changes", "redraw_differences", "require_error"]
 
 #: Default number of redraws.
 REDRAWS = 50
@@ -160,6 +160,35 @@ def redraw_changes(
     stream = np.random.default_rng(seed)
     every = [chosen.evaluate(found, redraw(truth, error, stream), area=area, grid=grid) for _ in range(redraws)]
     return Redraws(error=error, redraws=redraws, changes=changes_of(whole.values, [one.values for one in every]))
+
+
+def redraw_differences(
+    first: Footprints,
+    second: Footprints,
+    reference: Footprints,
+    *,
+    error: float,
+    evaluator: Evaluator,
+    area: shapely.Geometry | None = None,
+    grid: Grid | None = None,
+    redraws: int = REDRAWS,
+) -> Redraws:
+    """Return how far the differences between two detections move when the reference is redrawn; see `redraw_changes`.
+
+    Both are evaluated against the same redraws. A difference that is smaller than its change is not believed.
+    """
+    require_error(error)
+    stream = np.random.default_rng(0)
+    truths = [reference, *(redraw(reference, error, stream) for _ in range(redraws))]
+    found: list[Mapping[str, float | None]] = []
+    for truth in truths:
+        one, two = (evaluator.evaluate(side, truth, area=area, grid=grid).values for side in (first, second))
+        found.append({key: _difference(value, two[key]) for key, value in one.items()})
+    return Redraws(error=error, redraws=redraws, changes=changes_of(found[0], found[1:]))
+
+
+def _difference(one: float | None, two: float | None) -> float | None:
+    return None if one is None or two is None else two - one
 
 
 def require_error(error: float) -> None:

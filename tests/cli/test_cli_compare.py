@@ -35,6 +35,19 @@ def test_the_table_names_what_only_one_finds(files):
     assert "paired bootstrap of 9 blocks of 9 connected groups" in text
 
 
+def test_a_redrawn_reference_moves_the_differences(files):
+    words = ("compare", "a.geojson", "b.gpkg", "r.gpkg", "--reference-error", "0.5")
+    table = roofbench(*words, folder=files).stdout
+    assert "redrawn ±0.5 m" in table
+    assert "a smaller difference is not believed" in table
+    redrawn = json.loads(roofbench(*words, "-f", "json", folder=files).stdout)["reference_error"]
+    assert (redrawn["error"], redrawn["redraws"]) == (0.5, 50)
+    assert redrawn["changes"]["object.completeness"] == 0, "every house still overlaps its reference"
+    assert redrawn["changes"]["pixel.quality"] > 0
+    rows = list(csv.DictReader(io.StringIO(roofbench(*words, "-f", "csv", folder=files).stdout)))
+    assert {row["key"]: row["redrawn"] for row in rows}["object.completeness"] == "0.0"
+
+
 def test_json_and_csv_hold_the_differences(files):
     result = json.loads(roofbench("compare", "a.geojson", "b.gpkg", "r.gpkg", "-f", "json", folder=files).stdout)
     assert result["objects"] == {"both": 2, "only_a": 3, "only_b": 2, "neither": 1, "left_out": 0}
