@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from ...scenes.geodata.raster import Image
 
-__all__ = ["WINDOW", "grey_levels", "local_entropy"]
+__all__ = ["WINDOW", "coarse_entropy", "grey_levels", "local_entropy"]
 
 #: Side of the window, pixels.
 WINDOW = 9
@@ -78,3 +79,24 @@ def local_entropy(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
                 entropy = np.log2(held) - total / held
                 out[row, column] = np.uint8(max(0.0, min(255.0, scale * entropy + 0.5)))
     return out
+
+
+def coarse_entropy(grey: NDArray[np.uint8], gsd: float, *, largest: float) -> NDArray[np.uint8]:
+    """Return the local entropy in pixels of at most `largest` metres, on the cells of the image.
+
+    Averages of several pixels contain less noise, and an image whose pixels repeat coarser ones has the same entropy
+    as the coarse image.
+    """
+    parts = int(largest / gsd + 1e-9)
+    rows, columns = grey.shape
+    if parts <= 1 or rows < parts or columns < parts:
+        return np.asarray(local_entropy(grey))
+    size = columns // parts, rows // parts
+    averaged = cv2.resize(grey[: size[1] * parts, : size[0] * parts], size, interpolation=cv2.INTER_AREA)
+    entropy = local_entropy(np.asarray(averaged, dtype=np.uint8))
+    spread = np.empty((rows, columns), dtype=np.uint8)
+    inner = cv2.resize(entropy, (size[0] * parts, size[1] * parts), interpolation=cv2.INTER_NEAREST)
+    spread[: inner.shape[0], : inner.shape[1]] = inner
+    spread[inner.shape[0] :, : inner.shape[1]] = inner[-1]
+    spread[:, inner.shape[1] :] = spread[:, inner.shape[1] - 1 : inner.shape[1]]
+    return spread

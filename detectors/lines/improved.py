@@ -15,23 +15,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.parameters import parameter
-from ...scenes.geodata.raster import Grid, Image
+from ...scenes.geodata.raster import Image
 from .adjustment import adjust_to_neighbours, adjust_to_shape
-from .boxes import Boxes, lengths, prefix_sums
-from .entropy import grey_levels, local_entropy
+from .boxes import Boxes, lengths, prefix_sums, widths
+from .entropy import coarse_entropy, grey_levels
+from .entropy_scale import EntropyScale, entropy_scale
 from .extension import band, mean_in_boxes
 from .image_edges import ImageEdges, extract_edges
 from .line_detector import LineDetector
 from .line_modes import PAPER, PROGRAM
 from .line_parameters import PAPER_PIXEL
+from .masks import Masks
+from .orientation import Oriented, directions, gradient_sums, score_candidates
 from .rasters import Rasters
 from .segments import Segments
-from .texture import Texture, TextureRules, texture_of
+from .texture import Texture, TextureRules, texture_of, widened
 from .trace import Adjusted, Votes
 from .voting import cast_votes, longest_image_lines
 
 __all__ = ["Improved"]
 
+#: Largest pixel of the relative entropy, metres.
+_ENTROPY_PIXEL = 0.25
 #: Least area per pixel of edge in test 6, pixels.
 _EDGE_PIXELS = 45.0
 
@@ -47,8 +52,11 @@ class Improved(LineDetector):
             **PAPER,
             "curve_step": 0.1,
             "below_ground": 1.0,
+            "entropy": "mean",
             "entropy_threshold": 0.3,
             "adjustment": "longest",
+            "voting": True,
+            "texture": "tests",
             "vote_length": "printed",
             "texture_margin": 0.0,
             "edge_contrast": 0.0,
@@ -64,6 +72,7 @@ class Improved(LineDetector):
             "vegetation_side": "inside",
             "adjustment": "none",
             "voting": False,
+            "texture": "tests",
             "texture_margin": 0.0,
             # sqrt(2) px of the image, for 0.15 m.
             "edge_blur": 1.41,
@@ -78,13 +87,13 @@ class Improved(LineDetector):
         "entropy_level": {"entropy": ("share",)},
         "vote_length": {"voting": (True,)},
         "majority": {"voting": (True,)},
-        "edge_blur": {"voting": (True,), "texture": (True,)},
-        "edge_contrast": {"voting": (True,), "texture": (True,)},
-        "texture_margin": {"texture": (True,)},
-        "most_edges": {"texture": (True,)},
-        "area_per_edge": {"texture": (True,)},
-        "peaks": {"texture": (True,)},
-        "peak_ratio": {"texture": (True,)},
+        "edge_blur": {"voting": (True,), "texture": ("tests",)},
+        "edge_contrast": {"voting": (True,), "texture": ("tests",)},
+        "texture_margin": {"texture": ("orientation", "tests")},
+        "most_edges": {"texture": ("tests",)},
+        "area_per_edge": {"texture": ("tests",)},
+        "peaks": {"texture": ("tests",)},
+        "peak_ratio": {"texture": ("tests",)},
     }
 
     ground: str = parameter(
@@ -93,15 +102,16 @@ class Improved(LineDetector):
         source="2011, 3.1; 2010, 3.2; conference version, 3.1",
     )  # fmt: skip
     entropy_threshold: float = parameter(
-        0.7, minimum=0, maximum=1, swept=(0.3, 0.6, 0.65, 0.7, 0.75, 0.8),
-        doc="mean local entropy, as a share of its largest value, above which green areas are trees; 0.3 as printed",
+        0.5, minimum=0, maximum=1, swept=(0.1, 0.3, 0.5, 0.7, 0.9),
+        doc="local entropy above which green areas are trees, in the measure of `entropy`; 0.3 as printed",
         source="2011, 3.2; reading",
     )  # fmt: skip
     entropy: str = parameter(
-        "mean", choices=("mean", "share"),
-        doc="what `entropy_threshold` limits: the mean local entropy, or the share of pixels whose entropy is above "
-        "`entropy_level`",
-        source="2011, 3.2; program",
+        "relative", choices=("relative", "mean", "share"),
+        doc="what `entropy_threshold` limits: the mean local entropy between that of the ground (0) and of standing "
+        "green (1) in the same image, as a share of its largest possible value, or the share of pixels whose entropy "
+        "is above `entropy_level`",
+        source="2011, 3.2; reading; program",
     )  # fmt: skip
     entropy_level: float = parameter(
         0.8, minimum=0, maximum=1,
@@ -129,7 +139,7 @@ class Improved(LineDetector):
         source="2011, 3.3; reading",
     )  # fmt: skip
     voting: bool = parameter(
-        True, doc="whether lines need a majority of votes; optional in the print", source="2011, 3.3"
+        False, doc="whether lines need a majority of votes; optional in the print", source="2011, 3.3"
     )
     vote_length: str = parameter(
         "relative", choices=("relative", "printed"),
@@ -139,11 +149,12 @@ class Improved(LineDetector):
     majority: float = parameter(
         0.5, minimum=0, maximum=1, doc="mean vote above which a line is kept", source="2011, 3.3"
     )
-    texture: bool = parameter(
-        True,
-        doc="whether candidates are tested by edge orientation histograms; optional in the print",
-        source="2011, 3.4",
-    )
+    texture: str = parameter(
+        "orientation", choices=("orientation", "tests", "none"),
+        doc="how candidates are tested: by the directions of the brightness gradient, entropy and vegetation; by the "
+        "six printed tests of edge orientation histograms; not at all, which the print allows",
+        source="2011, 3.4; reading",
+    )  # fmt: skip
     edge_blur: float = parameter(
         1.5,
         unit="px of 0.15 m",
@@ -177,16 +188,23 @@ class Improved(LineDetector):
         source="2011, 3.4; reading",
     )  # fmt: skip
 
-    def _entropy(self, image: Image) -> NDArray[np.int32]:
-        entropy: NDArray[np.uint8] = local_entropy(grey_levels(image))
+    def _entropy(
+        self, image: Image, masks: Masks, vegetation: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int32], float, EntropyScale | None]:
+        grey, gsd = grey_levels(image), image.grid.gsd
+        # Absolute measures are those of the image as it is, as printed.
+        largest = _ENTROPY_PIXEL if self.entropy == "relative" else gsd
+        entropy = coarse_entropy(grey, gsd, largest=largest)
+        scale, limit = None, 255.0 * self.entropy_threshold
+        if self.entropy == "relative" or self.texture == "orientation":
+            scale = entropy_scale(entropy, vegetation, masks.primary, threshold=self._index_limit(image), gsd=gsd)
+            limit = scale.absolute(self.entropy_threshold) if self.entropy == "relative" else limit
         if self.entropy == "share" and entropy.size:
             low, high = int(entropy.min()), int(entropy.max())
             entropy = (entropy > low + self.entropy_level * (high - low)).astype(np.uint8)
+            limit = self.entropy_threshold
         prefix: NDArray[np.int32] = prefix_sums(entropy)
-        return prefix
-
-    def _entropy_limit(self) -> float:
-        return self.entropy_threshold if self.entropy == "share" else 255.0 * self.entropy_threshold
+        return prefix, limit, scale
 
     def _same_kind(self) -> bool:
         return self.green_extension == "same"
@@ -200,7 +218,7 @@ class Improved(LineDetector):
         for beside, farther in sides:
             is_green = mean_in_boxes(rasters.cover.vegetation, beside) > self._index_limit(rasters.image)
             green |= is_green
-            tree_edges |= is_green & (mean_in_boxes(rasters.cover.entropy, farther) > self._entropy_limit())
+            tree_edges |= is_green & (mean_in_boxes(rasters.cover.entropy, farther) > rasters.entropy_limit)
         return tree_edges, green
 
     def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
@@ -216,7 +234,7 @@ class Improved(LineDetector):
         return np.zeros(len(segments))
 
     def _image_edges(self, rasters: Rasters) -> ImageEdges | None:
-        if not (self.voting or self.texture):
+        if not (self.voting or self.texture == "tests"):
             return None
         return extract_edges(
             grey_levels(rasters.image),
@@ -248,8 +266,11 @@ class Improved(LineDetector):
     def _majority(self, votes: Votes) -> NDArray[np.bool_]:
         return np.asarray(np.nan_to_num(votes).mean(axis=1) > self.majority)
 
-    def _texture(self, candidates: Boxes, edges: ImageEdges | None, grid: Grid) -> Texture | None:
-        if not self.texture:
+    def _texture(self, candidates: Boxes, edges: ImageEdges | None, rasters: Rasters) -> Texture | Oriented | None:
+        grid = rasters.image.grid
+        if self.texture == "orientation":
+            return self._oriented(candidates, rasters)
+        if self.texture == "none":
             return None
         assert edges is not None
         rules = TextureRules(
@@ -261,3 +282,15 @@ class Improved(LineDetector):
             any_bin=self.peaks == "bins",
         )
         return texture_of(candidates, edges, grid, rules)
+
+    def _oriented(self, candidates: Boxes, rasters: Rasters) -> Oriented:
+        """Return the alignment, entropy and vegetation of candidates, and their scores."""
+        assert rasters.scale is not None
+        gradients = gradient_sums(grey_levels(rasters.image), rasters.gsd)
+        around = widened(candidates, self.texture_margin / rasters.gsd)
+        return score_candidates(
+            directions(gradients, around),
+            rasters.scale.scaled(mean_in_boxes(rasters.cover.entropy, candidates)),
+            mean_in_boxes(rasters.cover.vegetation, candidates) / self._index_limit(rasters.image),
+            lengths(candidates) * widths(candidates) * rasters.gsd**2,
+        )

@@ -22,25 +22,29 @@ from .colours import Colours
 from .contours import trace_shapes
 from .corners import find_corners
 from .duplicates import find_duplicates
+from .entropy_scale import EntropyScale
 from .extension import Cover, Growth, band, extend_lines, last_step, mean_in_boxes
 from .final_rectangles import FinalRules, final_rectangles
 from .initial_rectangles import INSIDE, TOO_NARROW, InitialRules, initial_rectangles
 from .line_parameters import PAPER_PIXEL, LineParameters
 from .line_steps import line_steps
 from .masks import Masks, build_cell_masks, build_masks, ground_correction, ground_heights, pulse_spacing
-from .rasters import Rasters
+from .rasters import Rasters, refined
 from .segments import Segments, beyond_coverage, fit_segments, inside_first
 from .trace import Adjusted, Outcome, Trace, Votes
 from .vegetation import vegetation_prefix
 
 if TYPE_CHECKING:
     from .image_edges import ImageEdges
+    from .orientation import Oriented
     from .texture import Texture
 
 __all__ = ["LineDetector"]
 
 #: The edge of a mask lies half a pixel outside the centres of its border pixels.
 _OUTSET = 0.5
+#: Largest pixel, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
+_PIXEL = 0.3
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
 _CURVE_STEP = 0.3
 #: Least length of a part of a side that is tested, point spacings: its first step then contains ten points or more.
@@ -83,8 +87,8 @@ class LineDetector(LineParameters):
         outcomes[remaining[made == INSIDE]] = Outcome.INSIDE
         outcomes[remaining[made == TOO_NARROW]] = Outcome.NARROW
         candidates, candidate_of = self._final_rectangles(rasters, initial)
-        texture = self._texture(candidates, edges, rasters.image.grid)
-        buildings = np.ones(len(candidates), dtype=np.bool_) if texture is None else np.any(texture.passed, axis=1)
+        texture = self._texture(candidates, edges, rasters)
+        buildings = np.ones(len(candidates), dtype=np.bool_) if texture is None else texture.buildings
         duplicates = np.zeros(len(candidates), dtype=np.bool_)
         duplicates[buildings] = find_duplicates(
             candidates[buildings], least=self.new_share, tolerance=np.radians(self.parallel_angle)
@@ -127,7 +131,7 @@ class LineDetector(LineParameters):
         """Return which lines have a majority."""
         return np.ones(len(votes), dtype=np.bool_)
 
-    def _texture(self, candidates: Boxes, edges: ImageEdges | None, grid: Grid) -> Texture | None:
+    def _texture(self, candidates: Boxes, edges: ImageEdges | None, rasters: Rasters) -> Texture | Oriented | None:
         """Return the texture of the candidates; none where it is not tested."""
         return None
 
@@ -162,21 +166,25 @@ class LineDetector(LineParameters):
         assert points is not None
         assert image is not None
         image = image.in_colour()
+        spacing = self.spacing or pulse_spacing(points, image.grid)
+        own_pixel = image.grid.gsd
+        image = refined(image, _PIXEL * spacing if self.largest_pixel is None else self.largest_pixel)
         grid = image.grid
-        tile_side = self.ground_tile * (PAPER_PIXEL if self.tile_pixel == "printed" else grid.gsd)
-        spacing = self.spacing or pulse_spacing(points, grid)
+        tile_side = self.ground_tile * (PAPER_PIXEL if self.tile_pixel == "printed" else own_pixel)
         surface = None if self.ground == "tile-mode" or not len(points) else scene.heights.ground
         ground = ground_heights(points, surface, method=self.ground, tile_side=tile_side)
         if self.ground == "point-dem" and self.below_ground < 1 and len(points):
             ground += ground_correction(points, ground, self.below_ground)
         masks = self._masks(points, ground + self.height, grid, spacing)
-        cover = Cover(prefix_sums(masks.primary), vegetation_prefix(image, self.vegetation), self._entropy(image))
+        vegetation = vegetation_prefix(image, self.vegetation)
+        entropy, limit, scale = self._entropy(image, masks, vegetation)
+        cover = Cover(prefix_sums(masks.primary), vegetation, entropy)
         bands = [image.bands.index(name) for name in ("red", "green", "blue")]
         rgb = image.values[:3] if bands == [0, 1, 2] else image.values[bands]
         if self.colour_smoothing > 0:
             rgb = np.stack([cv2.GaussianBlur(band, (3, 3), self.colour_smoothing) for band in rgb])
         colours = Colours(rgb, float(np.iinfo(rgb.dtype).max), self.colour_bins == "tenths")
-        return Rasters(image, masks, cover, colours, spacing)
+        return Rasters(image, masks, cover, colours, spacing, limit, scale)
 
     def _masks(self, points: PointCloud, thresholds: NDArray[np.float64], grid: Grid, spacing: float) -> Masks:
         clip = self.border == "drop"
@@ -190,8 +198,11 @@ class LineDetector(LineParameters):
         chosen = self.nir_threshold if "nir" in image.bands else None
         return self.vegetation_threshold if chosen is None else chosen
 
-    def _entropy(self, image: Image) -> NDArray[np.int32]:
-        return _NO_ENTROPY
+    def _entropy(
+        self, image: Image, masks: Masks, vegetation: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int32], float, EntropyScale | None]:
+        """Return the row prefix sums of the entropy, the mean above which green areas are trees, and its scale."""
+        return _NO_ENTROPY, 0.0, None
 
     def _growth(self, rasters: Rasters) -> Growth:
         stop = 0.8 * rasters.spacing if self.extension_stop is None else self.extension_stop
@@ -202,12 +213,9 @@ class LineDetector(LineParameters):
             black_share=self.extension_black,
             part=part / rasters.gsd,
             vegetation=self._index_limit(rasters.image),
-            entropy=self._entropy_limit(),
+            entropy=rasters.entropy_limit,
             same_kind=self._same_kind(),
         )
-
-    def _entropy_limit(self) -> float:
-        return 0.0
 
     def _same_kind(self) -> bool:
         return False

@@ -14,6 +14,7 @@ __all__ = ["PAPER", "PROGRAM"]
 
 #: Every reading at its printed form, in metres for pixels of 0.15 m.
 PAPER: Mapping[str, Any] = {
+    "largest_pixel": 1000.0,
     "marking": "squares",
     "neighbourhood": 0.75,
     "missed_corner": 1000.0,

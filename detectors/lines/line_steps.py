@@ -27,6 +27,7 @@ from ..steps import (
     ValueRaster,
 )
 from .boxes import Boxes, box_centres, box_corners, lengths, widths
+from .orientation import Oriented
 from .texture import BIN_COUNT, Texture
 from .trace import Outcome, Trace
 
@@ -43,6 +44,8 @@ _ROLES = {
     Outcome.NO_SIDE: Role.INPUT,
 }
 _DROPPED = (Outcome.VEGETATION, Outcome.UNADJUSTED, Outcome.OUTVOTED, Outcome.NARROW)
+#: What the numbers on the candidates mean.
+_NUMBERS = {Texture: "digits: the tests passed", Oriented: "numbers: the score, above 0 for buildings"}
 #: Histograms shown of each kind of candidates, kept and dropped, the largest ones.
 _SHOWN = 6
 
@@ -85,7 +88,7 @@ def line_steps(trace: Trace) -> Iterator[Step]:
             *_voted_lines(trace, trace.votes),
         )
     yield _final(trace)
-    if trace.texture is not None:
+    if isinstance(trace.texture, Texture):
         yield _histograms(trace, trace.texture)
 
 
@@ -164,16 +167,23 @@ def _final(trace: Trace) -> Step:
     ]
     caption = "Final rectangles, and candidates that larger ones cover"
     if trace.texture is not None:
-        caption += " or that lack the texture of a building; digits: the tests passed"
+        caption += " or that lack the texture of a building; " + _NUMBERS[type(trace.texture)]
         refused_rectangles = _rectangles(trace, trace.candidates[refused])
         layers.append(OutlineLayer(refused_rectangles, "no texture of a building", Role.REMOVED))
     layers.append(OutlineLayer(_rectangles(trace, trace.final), "building", Role.RESULT))
     if trace.texture is not None:
         # Away from the centre, which the rectangles of one house share.
         pixels = 0.7 * box_centres(trace.candidates) + 0.3 * box_corners(trace.candidates)[:, 0]
-        texts = tuple("".join(str(k + 1) for k in np.flatnonzero(passed)) for passed in trace.texture.passed)
+        texts = tuple(_numbers(trace.texture))
         layers.append(TextLayer(_places(trace, pixels), texts))
     return _map(trace, "final-rectangles", f"{caption}.", *layers)
+
+
+def _numbers(texture: Texture | Oriented) -> Iterator[str]:
+    if isinstance(texture, Oriented):
+        yield from (f"{score:.1f}" for score in texture.score)
+    else:
+        yield from ("".join(str(k + 1) for k in np.flatnonzero(passed)) for passed in texture.passed)
 
 
 def _histograms(trace: Trace, texture: Texture) -> Step:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from ...scenes.geodata.raster import Image
+import cv2
+import numpy as np
+
+from ...scenes.geodata.raster import Grid, Image
 from .colours import Colours
+from .entropy_scale import EntropyScale
 from .extension import Cover
 from .masks import Masks
 
-__all__ = ["Rasters"]
+__all__ = ["Rasters", "refined"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +29,10 @@ class Rasters:
     colours : Colours
     spacing : float
         Point spacing, metres.
+    entropy_limit : float
+        Mean of the entropy raster above which a green area is a tree.
+    scale : EntropyScale, optional
+        Scale of the image's entropy; none where it is not used.
     """
 
     image: Image
@@ -31,8 +40,23 @@ class Rasters:
     cover: Cover
     colours: Colours
     spacing: float
+    entropy_limit: float = 0.0
+    scale: EntropyScale | None = None
 
     @property
     def gsd(self) -> float:
         """Ground sampling distance, metres."""
         return self.image.grid.gsd
+
+
+def refined(image: Image, largest: float) -> Image:
+    """Return an image whose pixels are at most `largest` metres wide, interpolated linearly; fine ones unchanged."""
+    grid = image.grid
+    parts = math.ceil(grid.gsd / largest - 1e-9)
+    if parts <= 1 or not image.values.size:
+        return image
+    fine = Grid(grid.west, grid.north, grid.gsd / parts, grid.rows * parts, grid.columns * parts)
+    size = (fine.columns, fine.rows)
+    values = np.stack([cv2.resize(band, size, interpolation=cv2.INTER_LINEAR) for band in image.values])
+    valid = None if image.valid is None else image.valid.repeat(parts, axis=0).repeat(parts, axis=1)
+    return Image(values, image.bands, fine, valid)

@@ -32,7 +32,7 @@ from .boxes import U0, U1, V0, V1, Boxes, box_corners, lengths, to_box, widths
 from .contours import SAMPLE, Curves
 from .image_edges import ImageEdges
 
-__all__ = ["BIN_COUNT", "Texture", "TextureRules", "apply_tests", "histograms_of", "texture_of"]
+__all__ = ["BIN_COUNT", "Texture", "TextureRules", "apply_tests", "histograms_of", "texture_of", "widened"]
 
 #: Bins of 5 degrees in 180, the outer two merged.
 BIN_COUNT = 35
@@ -59,6 +59,11 @@ class Texture:
     collective: NDArray[np.float64]
     strongest: NDArray[np.float64]
     passed: NDArray[np.bool_]
+
+    @property
+    def buildings(self) -> NDArray[np.bool_]:
+        """Which candidates pass any test."""
+        return np.asarray(self.passed.any(axis=1))
 
 
 class TextureRules(NamedTuple):
@@ -253,9 +258,14 @@ def apply_tests(
     return passed
 
 
+def widened(boxes: Boxes, margin: float) -> Boxes:
+    """Return boxes with all sides moved outwards by `margin` pixels."""
+    return np.asarray(boxes + np.array([0, 0, 0, 0, -1, 1, -1, 1]) * margin)
+
+
 def texture_of(boxes: Boxes, edges: ImageEdges, grid: Grid, rules: TextureRules) -> Texture:
     """Return the histograms and tests of candidate rectangles on the grid of the image."""
-    wide = boxes + np.array([0, 0, 0, 0, -1, 1, -1, 1]) * rules.margin / grid.gsd
+    wide = widened(boxes, rules.margin / grid.gsd)
     collective, strongest = histograms_of(wide, edges.curves, edges.points, grid.shape)
     areas = lengths(wide) * widths(wide) * grid.gsd**2
     return Texture(edges, collective, strongest, apply_tests(collective, strongest, areas, rules))

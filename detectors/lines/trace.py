@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...scenes.geodata.raster import Grid, Image
 from .boxes import Boxes
 from .masks import Masks
+from .orientation import Oriented
 from .texture import Texture
 
 __all__ = ["Adjusted", "Outcome", "Trace", "Votes"]
@@ -93,8 +94,8 @@ class Trace:
     kept : ndarray of bool, shape (k,)
         Which candidates are buildings and no duplicates.
     votes : ndarray, shape (n, 4), optional
-    texture : Texture, optional
-        Edge orientation histograms and tests of the candidates.
+    texture : Texture or Oriented, optional
+        Edge orientation histograms and tests of the candidates, or their scores.
     """
 
     image: Image
@@ -111,7 +112,7 @@ class Trace:
     duplicates: NDArray[np.bool_]
     kept: NDArray[np.bool_]
     votes: Votes | None = None
-    texture: Texture | None = None
+    texture: Texture | Oriented | None = None
 
     @property
     def grid(self) -> Grid:
@@ -134,6 +135,7 @@ class Trace:
         counted["final rectangles"] = int(self.kept.sum())
         if self.texture is not None:
             counted["candidates without texture of a building"] = int((~self.kept & ~self.duplicates).sum())
+        if isinstance(self.texture, Texture):
             passed = self.texture.passed
             alone = passed & (passed.sum(axis=1) == 1)[:, None]
             counted |= {f"candidates kept by test {k + 1} alone": int(alone[:, k].sum()) for k in range(6)}

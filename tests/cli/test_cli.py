@@ -344,3 +344,12 @@ def test_tables_for_programs_are_all_that_is_on_standard_output(cli, misbehaving
         assert run.startswith("rank,group,detector,")
         assert "detector" in swept.splitlines()[0].split(",")
         assert len(swept.splitlines()) > 2
+
+
+def test_a_published_figure_is_drawn_and_its_text_checked(cli, tmp_path):
+    result = cli("sweep", "original", "fairfield-1-small", "--figure", 8, "--seeds", 1, "-j", 0, "--format", "md")
+    assert "| reduction | 0.15 |" in " ".join(result.stdout.replace("|  ", "| ").split())
+    assert "of 10 statements of the text reproduced" in result.stdout
+    assert (tmp_path / "original-figure-8.png").stat().st_size > 10_000
+    assert "leave out --vary" in cli("sweep", "original", "--figure", 8, "--vary", "rise=0", code=2)
+    assert "exists" in cli("sweep", "original", "fairfield-1-small", "--figure", 8, "--seeds", 1, "-j", 0, code=2)

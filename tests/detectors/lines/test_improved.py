@@ -38,7 +38,7 @@ def test_a_green_roof_is_found_because_its_texture_is_smooth():
 
 def test_the_index_alone_loses_the_green_roof():
     scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 20), GREEN_ROOF).build()
-    assert len(detect(scene, entropy_threshold=0.0)) == 0
+    assert len(detect(scene, entropy="mean", entropy_threshold=0.0)) == 0
 
 
 @pytest.mark.parametrize("colour", [LEAVES, AUTUMN])
@@ -51,13 +51,13 @@ def test_a_tree_as_big_as_a_house_is_dropped_whatever_its_colour(colour):
 
 def test_the_tests_of_texture_drop_what_the_votes_leave_of_a_brown_tree():
     scene = SceneBuilder(seed=3).tree(30, 30, 7.0, AUTUMN).build()
-    assert len(detect(scene, voting=False, texture=False)) > 0
-    assert len(detect(scene, voting=False, texture=True)) == 0
+    assert len(detect(scene, voting=False, texture="none")) > 0
+    assert len(detect(scene, voting=False, texture="tests")) == 0
 
 
 def test_votes_and_tests_are_optional_and_their_absence_computes_neither():
     scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 20)).build().for_detection()
-    trace = Improved(voting=False, texture=False).trace(scene)
+    trace = Improved(voting=False, texture="none").trace(scene)
     assert trace.votes is None
     assert trace.texture is None
     assert len(trace.final) == 1
@@ -65,7 +65,7 @@ def test_votes_and_tests_are_optional_and_their_absence_computes_neither():
 
 def test_a_line_with_a_poor_vote_is_dropped_with_that_reason():
     scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 20)).build().for_detection()
-    trace = Improved(majority=1.0).trace(scene)
+    trace = Improved(voting=True, majority=1.0).trace(scene)
     assert (trace.outcomes == Outcome.OUTVOTED).all()
     assert len(trace.final) == 0
 
@@ -92,14 +92,14 @@ def test_every_kind_of_adjustment_finds_the_house(choice):
 
 
 def test_the_detector_is_found_by_name_and_reads_its_switches():
-    detector = make_detector("improved[voting=false,entropy_threshold=0.3]")
-    assert detector.changed() == {"voting": False, "entropy_threshold": 0.3}
+    detector = make_detector("improved[voting=true,entropy_threshold=0.3]")
+    assert detector.changed() == {"voting": True, "entropy_threshold": 0.3}
 
 
 OTHER_VALUES = {"tile_pixel": "image", "vote_length": "printed", "peaks": "bins"}
 
 
-@pytest.mark.parametrize("base", [{"voting": False, "texture": False}, {"ground": "tile-mode"}], ids=["plain", "tile"])
+@pytest.mark.parametrize("base", [{"voting": False, "texture": "none"}, {"ground": "tile-mode"}], ids=["plain", "tile"])
 def test_parameters_that_are_declared_without_effect_have_none(base):
     scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 20)).tree(12, 48, 5.0, LEAVES).build()
     before = detect(scene, **base)

@@ -9,13 +9,14 @@ from roofbench.detectors.registry import make_detector
 
 STEPS = {
     "original": ["masks", "lines", "extended-lines", "initial-rectangles", "final-rectangles"],
-    "improved": [
+    "improved": ["masks", "lines", "extended-lines", "initial-rectangles", "final-rectangles"],
+    "improved[voting=true,texture=tests]": [
         "masks", "lines", "extended-lines", "initial-rectangles", "votes", "final-rectangles", "histograms",
     ],
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["original", "improved"])
+@pytest.mark.parametrize("name", list(STEPS))
 @pytest.mark.parametrize("builder", [SceneBuilder(side=30.0), SceneBuilder().house(rectangle(20, 30, 15, 10, 30))])
 def test_the_steps_end_with_the_rectangles_that_are_detected(name, builder):
     scene = builder.house(rectangle(45, 30, 12, 8, 70), GREEN_ROOF).tree(15, 10, 5).build().for_detection()

@@ -153,13 +153,13 @@ def test_lines_without_a_black_strip_are_dropped_with_that_reason():
 
 def test_entropy_is_relative_to_the_image():
     scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 20), GREEN_ROOF).tree(10, 50, 5).build().for_detection()
-    prefix = Improved(entropy="share")._entropy(scene.image)
-    high = np.diff(prefix, axis=1)
+    detector = Improved(entropy="share")
+    high = np.diff(detector._rasters(scene).cover.entropy, axis=1)
     assert set(np.unique(high)) == {0, 1}
     assert 0 < high.mean() < 0.9
 
 
-@pytest.mark.parametrize("detector", [Original(mode="program"), Improved(mode="program", texture=False)])
+@pytest.mark.parametrize("detector", [Original(mode="program"), Improved(mode="program", texture="none")])
 @pytest.mark.parametrize("degrees", [0, 30, 77])
 def test_the_program_finds_a_clean_house(detector, degrees):
     builder = SceneBuilder().house(rectangle(30, 30, 15, 10, degrees))
