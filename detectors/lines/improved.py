@@ -96,11 +96,6 @@ class Improved(LineDetector):
         "peak_ratio": {"texture": ("tests",)},
     }
 
-    ground: str = parameter(
-        "point-dem", choices=("tile-dem", "tile-mode", "point-dem"),
-        doc="ground height: DEM under the point, mean DEM of the tile, or most frequent height of the tile's points",
-        source="2011, 3.1; 2010, 3.2; conference version, 3.1",
-    )  # fmt: skip
     entropy_threshold: float = parameter(
         0.5, minimum=0, maximum=1, swept=(0.1, 0.3, 0.5, 0.7, 0.9),
         doc="local entropy above which green areas are trees, in the measure of `entropy`; 0.3 as printed",

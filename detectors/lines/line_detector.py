@@ -21,7 +21,7 @@ from .boxes import UX, UY, Boxes, box_corners, lengths, prefix_sums, widths
 from .colours import Colours
 from .contours import trace_shapes
 from .corners import find_corners
-from .duplicates import find_duplicates
+from .duplicates import DuplicateRules, find_duplicates
 from .entropy_scale import EntropyScale
 from .extension import Cover, Growth, band, extend_lines, last_step, mean_in_boxes
 from .final_rectangles import FinalRules, final_rectangles
@@ -91,7 +91,8 @@ class LineDetector(LineParameters):
         buildings = np.ones(len(candidates), dtype=np.bool_) if texture is None else texture.buildings
         duplicates = np.zeros(len(candidates), dtype=np.bool_)
         duplicates[buildings] = find_duplicates(
-            candidates[buildings], least=self.new_share, tolerance=np.radians(self.parallel_angle)
+            candidates[buildings],
+            DuplicateRules(self.new_share, float(np.radians(self.parallel_angle)), self.same_overlap),
         )
         return Trace(
             image=rasters.image,

@@ -25,6 +25,7 @@ PAPER: Mapping[str, Any] = {
     "inside_share": 1.0,
     "rise": 0.0,
     "new_share": 0.0,
+    "same_overlap": 1.0,
 }
 
 #: As printed, where the authors' own program does not differ; its masks have pixels of 0.25 m.

@@ -42,10 +42,11 @@ class LineParameters(Detector):
         "parameters given beside it override it",
     )  # fmt: skip
     ground: str = parameter(
-        "tile-dem",
+        "point-dem",
         choices=("tile-dem", "tile-mode", "point-dem"),
-        doc="ground height: mean DEM of the tile, most frequent height of the tile's points, or DEM under the point",
-        source="2010, 3.2; conference version, 3.1; 2011, 3.1",
+        doc="ground height: mean DEM of the tile (2010), most frequent height of the tile's points (conference "
+        "version), or DEM under the point (2011 and the authors' program)",
+        source="2010, 3.2; conference version, 3.1; 2011, 3.1; program",
     )
     below_ground: float = parameter(
         0.1, minimum=0, maximum=1, swept=(0.05, 0.1, 0.2, 1.0),
@@ -270,10 +271,16 @@ class LineParameters(Detector):
         source="2010, 3.4; reading",
     )  # fmt: skip
     new_share: float = parameter(
-        0.1, minimum=0, maximum=1, swept=(0.0, 0.05, 0.1, 0.2),
+        0.2, minimum=0, maximum=1, swept=(0.0, 0.1, 0.2, 0.3),
         doc="least share of a final rectangle outside the larger ones at an oblique angle to it; with less it is a "
         "duplicate; 0 keeps all, as printed",
         source="2010, 3.4: parts adjoin at right angles; reading",
+    )  # fmt: skip
+    same_overlap: float = parameter(
+        0.5, minimum=0, maximum=1, swept=(0.4, 0.5, 0.6, 0.8, 1.0),
+        doc="largest intersection over union of two final rectangles at any angle; with more the smaller one is a "
+        "duplicate; 1 keeps all, as printed",
+        source="2010, 3.4; reading",
     )  # fmt: skip
     parallel_angle: float = parameter(
         3.0, unit="deg", minimum=0, maximum=45,

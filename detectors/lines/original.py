@@ -33,7 +33,13 @@ class Original(LineDetector):
     name: ClassVar[str] = "original"
     paper = "Awrangjeb, Ravanbakhsh & Fraser 2010, ISPRS Journal of Photogrammetry and Remote Sensing 65(5)"
     modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "paper": {**PAPER, "curve_step": 0.15, "adjustment_reference": "any", "adjustment_share": 1.0},
+        "paper": {
+            **PAPER,
+            "ground": "tile-dem",
+            "curve_step": 0.15,
+            "adjustment_reference": "any",
+            "adjustment_share": 1.0,
+        },
         "program": {**PROGRAM, "adjustment_reference": "none"},
     }
 

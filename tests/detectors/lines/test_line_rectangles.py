@@ -7,7 +7,7 @@ from naive import lines as naive_lines
 from roofbench.detectors.lines.adjustment import adjust_to_neighbours, adjust_to_shape, rotate
 from roofbench.detectors.lines.boxes import U0, U1, UX, UY, V0, V1, prefix_sums
 from roofbench.detectors.lines.colours import Colours, dominant_bins, dominant_ranges, yiq_bins
-from roofbench.detectors.lines.duplicates import find_duplicates, new_share
+from roofbench.detectors.lines.duplicates import DuplicateRules, find_duplicates, new_share
 from roofbench.detectors.lines.extension import Cover, Growth, extend_lines, extend_rectangle
 from roofbench.detectors.lines.final_rectangles import (
     FinalRules,
@@ -189,18 +189,26 @@ def test_duplicates_are_those_that_larger_turned_rectangles_cover():
     rng = np.random.default_rng(8)
     boxes = rectangles(rng, 60)
     boxes[::3, UX:U0] = 1.0, 0.0
-    found = find_duplicates(boxes, least=0.31, tolerance=np.radians(3))
+    found = find_duplicates(boxes, DuplicateRules(0.31, np.radians(3)))
     np.testing.assert_array_equal(found, naive_lines.duplicates(boxes, 0.31, 3.0))
     assert 5 < found.sum() < 55
-    assert not find_duplicates(boxes, least=0.0, tolerance=np.radians(3)).any()
+    assert not find_duplicates(boxes, DuplicateRules(0.0, np.radians(3))).any()
 
 
 def test_a_wing_stays_however_much_of_it_lies_in_the_house_and_a_turned_rectangle_does_not():
     house, wing, turned = line(50, 30, 0, 60), line(60, 30, 90, 40), line(50, 32, 14, 52)
     house[V1], wing[V1], turned[V1] = 40, 15, 30
-    found = find_duplicates(np.array([wing, turned, house]), least=0.1, tolerance=np.radians(3))
+    found = find_duplicates(np.array([wing, turned, house]), DuplicateRules(0.1, np.radians(3)))
     assert found.tolist() == [False, True, False]
-    assert not find_duplicates(np.array([turned]), least=0.1, tolerance=np.radians(3)).any()
+    assert not find_duplicates(np.array([turned]), DuplicateRules(0.1, np.radians(3))).any()
+
+
+def test_of_two_rectangles_of_one_area_the_smaller_is_a_duplicate_at_any_angle():
+    house, again, turned, wing = line(50, 30, 0, 60), line(52, 30, 0, 56), line(50, 33, 8, 58), line(35, 20, 90, 50)
+    house[V1], again[V1], turned[V1], wing[V1] = 40, 40, 36, 18
+    boxes = np.array([house, again, turned, wing])
+    assert find_duplicates(boxes, DuplicateRules(0.0, np.radians(3), 0.5)).tolist() == [False, True, True, False]
+    assert not find_duplicates(boxes, DuplicateRules(0.0, np.radians(3))).any()
 
 
 @pytest.mark.parametrize(

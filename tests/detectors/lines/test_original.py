@@ -177,7 +177,7 @@ def test_on_a_slope_the_tile_ground_fails_and_the_point_ground_does_not():
     grid = Grid(flat.dem.grid.west, flat.dem.grid.north, 1.0, 60, 60)
     dem = Elevation((10 + slope * (np.arange(60) + 0.5) * np.ones((60, 1))).astype(np.float32), grid)
     scene = Scene("slope", flat.extent, points=tilted, image=flat.image, dem=dem)
-    tile, point = detect(scene), detect(scene, ground="point-dem")
+    tile, point = detect(scene, ground="tile-dem"), detect(scene)
     assert len(point) == 2
     houses = [rectangle(1015, 2045, 15, 10), rectangle(1045, 2015, 15, 10)]
     well = [
