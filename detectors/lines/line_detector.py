@@ -43,8 +43,6 @@ __all__ = ["LineDetector"]
 
 #: The edge of a mask lies half a pixel outside the centres of its border pixels.
 _OUTSET = 0.5
-#: Largest pixel, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
-_PIXEL = 0.3
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
 _CURVE_STEP = 0.3
 #: Least length of a part of a side that is tested, point spacings: its first step then contains ten points or more.
@@ -169,7 +167,7 @@ class LineDetector(LineParameters):
         image = image.in_colour()
         spacing = self.spacing or pulse_spacing(points, image.grid)
         own_pixel = image.grid.gsd
-        image = refined(image, _PIXEL * spacing if self.largest_pixel is None else self.largest_pixel)
+        image = refined(image, self.largest_pixel)
         grid = image.grid
         tile_side = self.ground_tile * (PAPER_PIXEL if self.tile_pixel == "printed" else own_pixel)
         surface = None if self.ground == "tile-mode" or not len(points) else scene.heights.ground

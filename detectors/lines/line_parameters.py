@@ -67,11 +67,11 @@ class LineParameters(Detector):
         doc="distance of neighbouring pulses that lengths follow; none: measured as the median of the scene",
         source="reading",
     )  # fmt: skip
-    largest_pixel: float | None = parameter(
-        None, unit="m", minimum=0.01,
-        doc="side of the largest pixel on which the steps run, a coarser image is interpolated; none: 0.3 point "
-        "spacings; 1000 keeps the pixels of the image, as printed",
-        source="2010: pixels of 0.15 m at a spacing of 0.5 m; reading",
+    largest_pixel: float = parameter(
+        0.25, unit="m", minimum=0.01,
+        doc="side of the largest pixel on which the steps run, a coarser image is interpolated; 1000 keeps the pixels "
+        "of the image, as printed",
+        source="2010: pixels of 0.15 m; reading",
     )  # fmt: skip
     height: float = parameter(
         2.5, unit="m", minimum=0, doc="least height above ground of a building", source="2010, 3.2"

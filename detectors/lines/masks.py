@@ -180,12 +180,26 @@ def ground_correction(points: PointCloud, ground: NDArray[np.float64], share: fl
     x, y = points.x[known], points.y[known]
     grid = Grid.covering((x.min() - _CORRECTION_CELL, y.min() - _CORRECTION_CELL, x.max(), y.max()), _CORRECTION_CELL)
     cell = grid.cells(x, y)[0]
-    ordered = above[known][np.lexsort((above[known], cell))]
+    ordered = _sorted_in_cells(above[known], cell)
     count = np.bincount(cell, minlength=grid.rows * grid.columns)
     place = np.cumsum(count) - count + np.floor(share * count).astype(np.int64)
     low = np.where(count > 0, np.minimum(ordered[np.minimum(place, len(ordered) - 1)], 0.0), 0.0)
     lowest = cv2.erode(low.astype(np.float32).reshape(grid.shape), np.ones((3, 3), np.uint8))
     return Elevation(lowest, grid).sample(points.x, points.y)
+
+
+def _sorted_in_cells(values: NDArray[np.float64], cell: NDArray[np.intp]) -> NDArray[np.float32]:
+    """Return the values in single precision, sorted by cell and then by value.
+
+    Both are packed into one integer, because sorting integers is several times faster than sorting by two keys. The
+    bits of a float are in the order of its value when those of a negative one are inverted and the sign of others is.
+    """
+    bits = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
+    negative = bits >> np.uint32(31) > 0
+    rising = np.where(negative, ~bits, bits | np.uint32(1 << 31))
+    packed = np.sort(cell.astype(np.uint64) << np.uint64(32) | rising)
+    low = (packed & np.uint64(0xFFFFFFFF)).astype(np.uint32)
+    return np.where(low >> np.uint32(31) > 0, low & np.uint32(0x7FFFFFFF), ~low).view(np.float32)
 
 
 def _hits(points: PointCloud, chosen: NDArray[np.bool_], grid: Grid) -> NDArray[np.uint8]:

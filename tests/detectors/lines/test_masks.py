@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from naive import lines as naive_lines
 
-from roofbench.detectors.lines.masks import build_masks, ground_correction, ground_heights, pulse_spacing
+from roofbench.detectors.lines.masks import (
+    _sorted_in_cells,
+    build_masks,
+    ground_correction,
+    ground_heights,
+    pulse_spacing,
+)
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid
 
@@ -182,3 +188,11 @@ def test_no_more_than_the_share_of_the_points_of_a_cell_lie_below_the_corrected_
     found = ground_correction(both, ground, share)[3000:]
     for x, y, value in zip(centre.x, centre.y, found, strict=True):
         assert value == pytest.approx(step[int(y // 4), int(x // 4)], abs=1e-5)
+
+
+def test_heights_are_sorted_within_cells_as_by_two_keys():
+    rng = np.random.default_rng(11)
+    values = np.concatenate([rng.normal(0, 3, 400), [0.0, -0.0, 1e-8, -1e-8]])
+    cell = rng.integers(0, 12, len(values))
+    expected = values.astype(np.float32)[np.lexsort((values.astype(np.float32), cell))]
+    np.testing.assert_array_equal(_sorted_in_cells(values, cell), expected)
