@@ -174,7 +174,7 @@ _FIGURE_8 = PublishedSweep(
     parameters=("ground_tile", "black_share", "vegetation_threshold", "reduction", "colour_similarity"),
     scenes=("fairfield-1", "fairfield-2", "fairfield-3"),
     seeds=3,
-    standard={"ground": "tile-dem"},
+    standard={"ground": "tile-dem", "rise": 0.0},
     statements=(
         _Statement(
             "reduction is moderately sensitive, the other four less",
