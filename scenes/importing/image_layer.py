@@ -46,7 +46,7 @@ def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, ba
 
 def image_of_points(place: Place, points: PointCloud, gsd: float | None, files: Sequence[Path]) -> Image:
     """Return the orthoimage that coloured points give."""
-    from .coloured_points import image_from_points
+    from ..geodata.coloured_points import image_from_points
 
     check_size(place, gsd or 0.1, "gsd")
     image = image_from_points(points, place.extent, gsd=gsd, source=file_paths(files))

@@ -65,6 +65,7 @@ def scene_of(recipe: SceneParameters, *, seed: int, name: str = "synthetic", pre
     if isinstance(seed, bool) or int(seed) != seed or seed < 0:
         raise ParameterError(f"{name}: seed must be a whole number of at least 0, not {seed!r}")
     seed = int(seed)
+    extent = (ORIGIN[0], ORIGIN[1], ORIGIN[0] + recipe.width, ORIGIN[1] + recipe.height)
 
     # Imported when a piece is asked for: listing presets must not wait for the compiler.
     @cache
@@ -73,15 +74,30 @@ def scene_of(recipe: SceneParameters, *, seed: int, name: str = "synthetic", pre
 
         return make_world(recipe, seed)
 
-    def points() -> PointCloud:
-        from .lidar import scan
-
-        return scan(world(), ORIGIN)
-
-    def image() -> Image | None:
+    @cache
+    def photo() -> Image | None:
         from .orthoimage import photograph
 
         return photograph(world(), ORIGIN)
+
+    @cache
+    def coloured() -> PointCloud:
+        from .image_making import coloured_points
+        from .lidar import scan
+
+        cloud, taken = scan(world(), ORIGIN), photo()
+        return cloud if taken is None else coloured_points(cloud, taken)
+
+    def points() -> PointCloud:
+        from .lidar import scan
+
+        return coloured() if recipe.point_colours else scan(world(), ORIGIN)
+
+    def image() -> Image | None:
+        from .image_making import processed, rastered
+
+        made = photo() if recipe.image_from == "camera" else rastered(coloured(), extent, recipe)
+        return None if made is None else processed(made, recipe.image_processing)
 
     def dem() -> Elevation:
         from .survey import measured_dem
@@ -95,7 +111,7 @@ def scene_of(recipe: SceneParameters, *, seed: int, name: str = "synthetic", pre
 
     return Scene(
         name,
-        (ORIGIN[0], ORIGIN[1], ORIGIN[0] + recipe.width, ORIGIN[1] + recipe.height),
+        extent,
         crs=f"EPSG:{recipe.epsg}",
         points=points,
         image=image if recipe.bands != "none" else None,

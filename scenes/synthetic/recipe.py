@@ -170,6 +170,18 @@ class SceneParameters(Parameterised):
         0.0, unit="m", minimum=0, maximum=10, doc="offset of the orthoimage against the points", swept=(0, 0.5, 1, 2)
     )
 
+    point_colours: bool = parameter(False, doc="whether points have the colour of the orthoimage where they lie")
+    image_from: str = parameter(
+        "camera", choices=("camera", "nearest", "linear"),
+        doc="orthoimage as taken, or rastered from the colours of the points, in pixels of 0.7 point spacings: gaps "
+        "take the nearest colour or are interpolated",
+    )  # fmt: skip
+    image_processing: str = parameter(
+        "none", choices=("none", "resampled", "compressed", "sharpened", "blurred"),
+        doc="what was done to the orthoimage: resampled to pixels of 0.5 m and back, compressed as JPEG of quality 20, "
+        "unsharp mask, blurred with a sigma of 0.3 m",
+    )  # fmt: skip
+
     dem_error: float = parameter(
         0.12,
         unit="m",

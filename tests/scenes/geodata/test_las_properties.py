@@ -9,8 +9,8 @@ import pytest
 from laspy.vlrs.known import GeoKeyEntryStruct, WktCoordinateSystemVlr
 
 from roofbench.core.errors import CRSError, InputError
+from roofbench.scenes.geodata.coloured_points import image_from_points
 from roofbench.scenes.geodata.las_files import read_las_header, read_points
-from roofbench.scenes.importing.coloured_points import image_from_points
 
 WEST, SOUTH = 500000.0, 5500000.0
 

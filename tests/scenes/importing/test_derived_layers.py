@@ -6,9 +6,9 @@ import shapely
 
 import roofbench as rb
 from roofbench.core.errors import InputError
+from roofbench.scenes.geodata.coloured_points import image_from_points
 from roofbench.scenes.geodata.surfaces import highest_surface, mean_intensity
 from roofbench.scenes.importing.class_outlines import outlines_of_class
-from roofbench.scenes.importing.coloured_points import image_from_points
 
 EXTENT = (0.0, 0.0, 60.0, 50.0)
 
@@ -105,6 +105,16 @@ def test_gaps_are_filled_near_points_and_left_open_beyond():
     assert image.valid[row, columns].tolist() == [True, True, False, True, True]
     assert image.values[0, row, columns[1]] == 255
     assert image.values[:, row, columns[2]].tolist() == [0, 0, 0]
+
+
+def test_gaps_are_interpolated_or_take_the_nearest_colour():
+    x = np.array([0.5, 3.5])
+    grey = np.repeat(np.array([[10], [40]], np.uint16) * 257, 3, axis=1)
+    points = rb.PointCloud(x=x, y=np.full(2, 0.5), z=np.zeros(2), colour=grey)
+    linear, nearest = (image_from_points(points, (0, 0, 4, 1), gsd=1.0, fill=fill) for fill in ("linear", "nearest"))
+    assert nearest.values[0, 0].tolist() == [10, 10, 40, 40]
+    # Weights 2.5 and 1.5 at distances 1 and 2, cells with points keep their colour.
+    assert linear.values[0, 0].tolist() == [10, 21, 29, 40]
 
 
 def test_later_returns_do_not_colour_the_image():

@@ -1,18 +1,22 @@
 """An orthoimage from coloured points, where there is no other.
 
-Each cell takes the mean colour of the first returns in it; cells without one take the nearest within `REACH` cells;
-beyond that the image has no data.
+Each cell takes the mean colour of the first returns in it. Cells without one are interpolated between the cells within
+`REACH`, with weights that fall linearly with the distance; beyond that the image has no data. The nearest colour
+instead repeats pixels: many images of this kind are made so, with edges as ragged as the points lie.
 """
 
 from __future__ import annotations
 
+from typing import Literal
+
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ..geodata.density import point_spacing
-from ..geodata.points import PointCloud
-from ..geodata.raster import Grid, Image
+from .density import point_spacing
+from .points import PointCloud
+from .raster import Grid, Image
 
 __all__ = ["REACH", "image_from_points"]
 
@@ -27,6 +31,7 @@ def image_from_points(
     extent: tuple[float, float, float, float],
     *,
     gsd: float | None = None,
+    fill: Literal["linear", "nearest"] = "linear",
     source: str = "point cloud",
 ) -> Image:
     """Return the colours of points as an image of 8 bits.
@@ -39,6 +44,8 @@ def image_from_points(
         ``(xmin, ymin, xmax, ymax)``, metres.
     gsd : float, optional
         Cell size in metres; by default the smallest of a list, 0.1 m to 1 m, at which a cell holds a point on average.
+    fill : {"linear", "nearest"}
+        How cells without points are filled.
     source : str
         File or files, for messages.
 
@@ -71,11 +78,24 @@ def image_from_points(
         values[band] = np.round(mean / 257.0).reshape(grid.shape)
     known = (count > 0).reshape(grid.shape)
     distance, nearest = ndimage.distance_transform_edt(~known, return_indices=True)
-    values = values[:, nearest[0], nearest[1]]
+    filled = _interpolated(values, known) if fill == "linear" else values[:, nearest[0], nearest[1]]
+    values = np.where(known, values, filled)
     valid = np.asarray(distance <= REACH)
     values[:, ~valid] = 0
     names = ("red", "green", "blue", "nir")[: colour.shape[1]]
     return Image(values, names, grid, None if valid.all() else valid)
+
+
+def _interpolated(values: NDArray[np.uint8], known: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return the mean of the known cells around each cell, weighted by their distance; 0 where there is none."""
+    offsets = np.arange(-REACH, REACH + 1)
+    weights = np.maximum(REACH + 0.5 - np.hypot(offsets[:, None], offsets[None, :]), 0).astype(np.float32)
+    total = np.maximum(cv2.filter2D(known.astype(np.float32), -1, weights, borderType=cv2.BORDER_CONSTANT), 1e-6)
+    sums = (
+        cv2.filter2D(np.where(known, band, 0).astype(np.float32), -1, weights, borderType=cv2.BORDER_CONSTANT)
+        for band in values
+    )
+    return np.stack([np.round(band / total) for band in sums]).astype(np.uint8)
 
 
 def _size(x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, float, float, float]) -> float:
