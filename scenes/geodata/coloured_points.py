@@ -1,8 +1,8 @@
 """An orthoimage from coloured points, where there is no other.
 
 Each cell takes the mean colour of the first returns in it. Cells without one are interpolated between the cells within
-`REACH`, with weights that fall linearly with the distance; beyond that the image has no data. The nearest colour
-instead repeats pixels: many images of this kind are made so, with edges as ragged as the points lie.
+`REACH`, with weights that fall with the fourth power of the distance; beyond that the image has no data. The nearest
+colour instead repeats pixels: many images of this kind are made so, with edges as ragged as the points lie.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def image_from_points(
     extent: tuple[float, float, float, float],
     *,
     gsd: float | None = None,
-    fill: Literal["linear", "nearest"] = "linear",
+    fill: Literal["interpolated", "nearest"] = "interpolated",
     source: str = "point cloud",
 ) -> Image:
     """Return the colours of points as an image of 8 bits.
@@ -44,7 +44,7 @@ def image_from_points(
         ``(xmin, ymin, xmax, ymax)``, metres.
     gsd : float, optional
         Cell size in metres; by default the smallest of a list, 0.1 m to 1 m, at which a cell holds a point on average.
-    fill : {"linear", "nearest"}
+    fill : {"interpolated", "nearest"}
         How cells without points are filled.
     source : str
         File or files, for messages.
@@ -78,7 +78,7 @@ def image_from_points(
         values[band] = np.round(mean / 257.0).reshape(grid.shape)
     known = (count > 0).reshape(grid.shape)
     distance, nearest = ndimage.distance_transform_edt(~known, return_indices=True)
-    filled = _interpolated(values, known) if fill == "linear" else values[:, nearest[0], nearest[1]]
+    filled = _interpolated(values, known) if fill == "interpolated" else values[:, nearest[0], nearest[1]]
     values = np.where(known, values, filled)
     valid = np.asarray(distance <= REACH)
     values[:, ~valid] = 0
@@ -89,8 +89,9 @@ def image_from_points(
 def _interpolated(values: NDArray[np.uint8], known: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """Return the mean of the known cells around each cell, weighted by their distance; 0 where there is none."""
     offsets = np.arange(-REACH, REACH + 1)
-    weights = np.maximum(REACH + 0.5 - np.hypot(offsets[:, None], offsets[None, :]), 0).astype(np.float32)
-    total = np.maximum(cv2.filter2D(known.astype(np.float32), -1, weights, borderType=cv2.BORDER_CONSTANT), 1e-6)
+    distance = np.hypot(offsets[:, None], offsets[None, :])
+    weights = np.where((distance > 0) & (distance < REACH + 0.5), np.maximum(distance, 1.0) ** -4, 0).astype(np.float32)
+    total = np.maximum(cv2.filter2D(known.astype(np.float32), -1, weights, borderType=cv2.BORDER_CONSTANT), 1e-9)
     sums = (
         cv2.filter2D(np.where(known, band, 0).astype(np.float32), -1, weights, borderType=cv2.BORDER_CONSTANT)
         for band in values

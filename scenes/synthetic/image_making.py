@@ -43,7 +43,7 @@ def rastered(points: PointCloud, extent: tuple[float, float, float, float], reci
     """Return the image made of coloured points; None when the recipe has no bands."""
     if points.colour is None:
         return None
-    fill: Literal["linear", "nearest"] = "nearest" if recipe.image_from == "nearest" else "linear"
+    fill: Literal["interpolated", "nearest"] = "nearest" if recipe.image_from == "nearest" else "interpolated"
     return image_from_points(points, extent, gsd=_PIXEL * recipe.point_spacing, fill=fill)
 
 

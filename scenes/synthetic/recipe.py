@@ -172,7 +172,7 @@ class SceneParameters(Parameterised):
 
     point_colours: bool = parameter(False, doc="whether points have the colour of the orthoimage where they lie")
     image_from: str = parameter(
-        "camera", choices=("camera", "nearest", "linear"),
+        "camera", choices=("camera", "nearest", "interpolated"),
         doc="orthoimage as taken, or rastered from the colours of the points, in pixels of 0.7 point spacings: gaps "
         "take the nearest colour or are interpolated",
     )  # fmt: skip

@@ -25,7 +25,7 @@ KINDS = {"original": {}} | {
 }  # fmt: skip
 for _density, _spacing in DENSITIES.items():
     KINDS[f"{_density}/m2, original"] = {"point_spacing": _spacing}
-    for _fill in ("nearest", "linear"):
+    for _fill in ("nearest", "interpolated"):
         KINDS[f"{_density}/m2, {_fill}"] = {"point_spacing": _spacing, "image_from": _fill}
 
 

@@ -111,10 +111,12 @@ def test_gaps_are_interpolated_or_take_the_nearest_colour():
     x = np.array([0.5, 3.5])
     grey = np.repeat(np.array([[10], [40]], np.uint16) * 257, 3, axis=1)
     points = rb.PointCloud(x=x, y=np.full(2, 0.5), z=np.zeros(2), colour=grey)
-    linear, nearest = (image_from_points(points, (0, 0, 4, 1), gsd=1.0, fill=fill) for fill in ("linear", "nearest"))
+    linear, nearest = (
+        image_from_points(points, (0, 0, 4, 1), gsd=1.0, fill=fill) for fill in ("interpolated", "nearest")
+    )
     assert nearest.values[0, 0].tolist() == [10, 10, 40, 40]
-    # Weights 2.5 and 1.5 at distances 1 and 2, cells with points keep their colour.
-    assert linear.values[0, 0].tolist() == [10, 21, 29, 40]
+    # Weights 1 and 1/16 at distances 1 and 2, cells with points keep their colour.
+    assert linear.values[0, 0].tolist() == [10, 12, 38, 40]
 
 
 def test_later_returns_do_not_colour_the_image():

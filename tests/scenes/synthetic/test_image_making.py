@@ -23,7 +23,7 @@ def test_points_have_the_colour_of_the_pixel_they_lie_in(taken):
     assert scene().points.colour is None
 
 
-@pytest.mark.parametrize("fill", ["nearest", "linear"])
+@pytest.mark.parametrize("fill", ["nearest", "interpolated"])
 def test_an_image_of_points_has_pixels_by_their_density_and_the_colours_of_the_photograph(taken, fill):
     dense, thin = (scene(image_from=fill, point_spacing=spacing).image for spacing in (0.3, 1.0))
     assert (dense.grid.gsd, thin.grid.gsd) == (pytest.approx(0.21), pytest.approx(0.7))
@@ -31,9 +31,9 @@ def test_an_image_of_points_has_pixels_by_their_density_and_the_colours_of_the_p
         np.testing.assert_allclose(image.values.mean(axis=(1, 2)), taken.values.mean(axis=(1, 2)), atol=3)
 
 
-def test_nearest_repeats_pixels_and_linear_interpolates_them():
+def test_nearest_repeats_pixels_and_interpolation_does_not():
     nearest, linear = (
-        scene(image_from=fill, point_spacing=1.0).image.values.astype(int) for fill in ("nearest", "linear")
+        scene(image_from=fill, point_spacing=1.0).image.values.astype(int) for fill in ("nearest", "interpolated")
     )
     repeated = [(np.diff(values, axis=2) == 0).all(axis=0).mean() for values in (nearest, linear)]
     assert repeated[0] > 0.2 > 4 * repeated[1]
