@@ -1,4 +1,4 @@
-"""The studies of docs/results/line-detectors.md: pattern of results, losses, ablation, sensitivity, pictures.
+"""The studies of docs/results/line-detectors.md: pattern of results, losses, ablation, pictures.
 
 Run by hand: ``python tests/performance/study_lines.py STUDY [--seeds 1,2,3]``; ``--help`` names the studies.
 
@@ -26,7 +26,7 @@ COLUMNS = ("C_m", "C_r", "Q_l", "M_d", "D_o", "C_rd", "C_rr", "C_mp", "C_rp", "Q
 ABLATIONS = {
     "original": (
         "marking=squares",
-        "ground=point-dem",
+        "ground=tile-dem",
         "ground=tile-mode",
         "vegetation=pseudo-ndvi",
         "adjustment_reference=any",
@@ -43,24 +43,22 @@ ABLATIONS = {
         "rise=0",
         "compare=whole",
         "new_share=0",
-        "new_share=0.2",
+        "same_overlap=1",
     ),
     "improved": (
         "marking=squares",
         "ground=tile-dem",
         "below_ground=1",
-        "entropy_threshold=0.3",
+        "entropy=mean,entropy_threshold=0.7",
         "vegetation_side=inside",
         "adjustment=longest",
         "adjustment=neighbours",
         "adjustment=none",
-        "vote_length=printed",
-        "voting=false",
-        "texture=false",
-        "texture=false,voting=false",
+        "voting=true",
+        "texture=none",
+        "texture=tests,entropy=mean,entropy_threshold=0.7,voting=true",
         "texture_margin=0",
-        "edge_contrast=0",
-        "peak_ratio=1",
+        "texture=tests",
         "missed_corner=1000",
         "curve_step=0.15",
         "extension_part=3",
@@ -74,7 +72,7 @@ ABLATIONS = {
         "inside_margin=0",
         "rise=0",
         "new_share=0",
-        "new_share=0.2",
+        "same_overlap=1",
     ),
 }
 #: Steps that the page shows.
@@ -87,21 +85,6 @@ PICTURED = {
     "improved-05-votes",
     "improved-06-final-rectangles",
     "improved-07-histograms",
-}
-#: The five parameters of figure 8 and the values of section 4.4.1.
-SENSITIVITY = {
-    "ground_tile": (400, 450, 500, 550, 600),
-    "black_share": (0.6, 0.7, 0.8, 0.9, 1.0),
-    "vegetation_threshold": (32, 40, 48, 56, 64),
-    "reduction": (0.10, 0.15, 0.20, 0.25, 0.30),
-    "colour_similarity": (0.2, 0.3, 0.4, 0.5, 0.6),
-}
-LABELS = {
-    "ground_tile": "tile size (px of 0.15 m)",
-    "black_share": "black pixel threshold",
-    "vegetation_threshold": "vegetation threshold",
-    "reduction": "area reduction",
-    "colour_similarity": "colour similarity",
 }
 
 
@@ -142,7 +125,7 @@ def pattern(seeds):
     print("|---" * (len(COLUMNS) + 1) + "|")
     for area, names in AREAS.items():
         scenes = [scene_of(name, seed) for name in names for seed in seeds]
-        for detector in ("original", "original[ground=point-dem]", "improved"):
+        for detector in ("original", "improved"):
             row = means([indices(scene, detector) for scene in scenes])
             print(f"| {detector}, {area} | {cells(row)} |", flush=True)
 
@@ -164,42 +147,6 @@ def ablation(seeds, detectors):
             else:
                 text = [f"{value - before:+.1f}" for value, before in zip(values, base, strict=True)]
             print(f"| {f'`{change}`' if change else 'as it is'} | " + " | ".join(text) + " |", flush=True)
-
-
-def sensitivity(seeds):
-    from matplotlib.figure import Figure
-
-    scenes = [scene_of(name, seed) for name in FAIRFIELD for seed in seeds]
-    print("| parameter | value | Q_l | Q_lp |\n|---|---|---|---|")
-    figure = Figure(figsize=(11, 3.6))
-    panels = figure.subplots(1, 2, sharex=True)
-    for parameter, values in SENSITIVITY.items():
-        rows = [means([indices(scene, f"original[{parameter}={value}]") for scene in scenes]) for value in values]
-        default = rb.make_detector("original").values()[parameter]
-        for value, row in zip(values, rows, strict=True):
-            mark = " (standard)" if value == default else ""
-            print(f"| {LABELS[parameter]} | {value:g}{mark} | {row[2]:.1f} | {row[9]:.1f} |", flush=True)
-        for panel, column in zip(panels, (2, 9), strict=True):
-            panel.plot(range(1, 6), [row[column] for row in rows], marker="o", label=LABELS[parameter])
-    for panel, title in zip(panels, ("object quality Q_l, %", "pixel quality Q_lp, %"), strict=True):
-        panel.set_title(title, fontsize=10)
-        panel.set_xlabel("number of the value (1 to 5)")
-        panel.set_xticks(range(1, 6))
-        panel.grid(alpha=0.3)
-    panels[1].legend(fontsize=8, loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
-    save(figure, "lines-sensitivity.png")
-
-
-def entropy(seeds):
-    scenes = {area: [scene_of(name, seed) for name in names for seed in seeds] for area, names in AREAS.items()}
-    print("| entropy_threshold | " + " | ".join(f"{area} Q_l | Q_lp" for area in scenes) + " |")
-    print("|---" * (2 * len(scenes) + 1) + "|")
-    for value in (0.3, 0.6, 0.65, 0.7, 0.75, 0.8):
-        text = []
-        for members in scenes.values():
-            row = means([indices(scene, f"improved[entropy_threshold={value}]") for scene in members])
-            text += [f"{row[2]:.1f}", f"{row[9]:.1f}"]
-        print(f"| {value:g} | " + " | ".join(text) + " |", flush=True)
 
 
 def loss_of(reference, trace, lines, detected):
@@ -360,8 +307,6 @@ STUDIES = {
     "pattern": pattern,
     "losses": losses,
     "tiles": tiles,
-    "sensitivity": sensitivity,
-    "entropy": entropy,
     "pictures": pictures,
 }
 
