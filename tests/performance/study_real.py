@@ -33,7 +33,7 @@ IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 THRESHOLDS = {
     "low points, share of the least height": (preparation, "_LOW_SHARE", 0.8, (0.6, 0.7, 0.8, 0.9)),
     "rise of a crown above its roofs, cm": (block_cells, "_CROWN_RISE", 100_000, (100, 200, 250, 300, 100_000)),
-    "step between a roof and its rim, cm": (block_cells, "_RIM_STEP", -1, (-1, 30, 50, 100)),
+    "step between a roof and its rim, cm": (block_cells, "_RIM_STEP", -100_000, (-100_000, 30, 50, 100)),
     "width of gaps, m": (block_cells, "_NARROW", 0.01, (0.01, 3.0, 4.0, 5.0, 6.0)),
     "radius of the opening, m": (block_cells, "_OPENING", None, (0.5, 1.0, 1.5)),
     "certain party walls of a row": (rows, "_CERTAIN_WALLS", 1000, (2, 3, 4, 1000)),
@@ -96,12 +96,12 @@ def agreement(found, scene):
 def run(detector, scenes, seeds):
     """Return the mean over seeds for each scene on which the detector runs.
 
-    A folder in place of a detector holds footprints of another version, SCENE-SEED.gpkg.
+    A folder (a name with a slash) in place of a detector holds footprints of another version, SCENE-SEED.gpkg.
     """
     found = {}
     for name, scene in scenes.items():
         try:
-            if Path(detector).is_dir():
+            if "/" in detector:
                 sets = [read_footprints(file) for file in sorted(Path(detector).glob(f"{name}-[0-9].gpkg"))]
             else:
                 sets = [rb.detect(scene, detector, seed=seed) for seed in range(seeds)]
