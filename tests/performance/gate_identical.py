@@ -39,7 +39,7 @@ def values_of(suite, store, jobs=1):
 
 def verdicts(before, after):
     sides = (Measured(PluginRecipe("detector", {}), (), runs) for runs in (before, after))
-    return [verdict.verdict for verdict in compare_detector("detector", *sides, indices=INDICES, margins=MARGINS)]
+    return [found.conclusion for found in compare_detector("detector", *sides, indices=INDICES, margins=MARGINS)]
 
 
 def stochastic(store):
