@@ -164,3 +164,18 @@ def test_the_generated_pages_are_those_of_the_code():
         del texts["reference/cli.md"]
     stale = [name for name, text in texts.items() if (ROOT / "docs" / name).read_text(encoding="utf-8") != text]
     assert stale == [], "run: python -m tests.documentation.reference"
+
+
+def test_studies_are_no_commands_of_ci():
+    """Blocks without a mark run in CI: a study among them would take its whole time."""
+    from documentation.commands import blocks_of, pages
+
+    commands = [
+        f"{page.relative_to(ROOT)}: {command}"
+        for page in pages()
+        for block in blocks_of(page)
+        if not block.mark and block.language != "python"
+        for command, _ in block.commands
+    ]
+    long = [command for command in commands if re.search(r": python |roofbench run papers|tests/performance", command)]
+    assert long == [], "put <!-- nightly --> or <!-- not run: REASON --> above the block"
