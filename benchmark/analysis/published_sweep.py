@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from ...core.errors import ParameterError, UnknownNameError
+from ...evaluators.registry import make_evaluator
 from ..suite import DetectorEntry, Suite
 from .sweep import Axis, axis_of
 
@@ -37,7 +38,9 @@ __all__ = [
     "published_sweep",
 ]
 
-_OBJECT, _PIXEL = "object.quality", "pixel.quality"
+_OBJECT, _PIXEL = "object", "pixel"
+#: Symbols of both qualities, as the papers print them.
+_SYMBOLS = {_OBJECT: "Q_l", _PIXEL: "Q_lp"}
 #: Difference of means, share of 1, below which two values count as equal: figures are read to about half a per cent.
 _EQUAL = 0.0025
 
@@ -139,9 +142,8 @@ def _widest(curves: Curves, name: str) -> bool:
 
 
 def _highest_at(name: str, index: str, value: float) -> _Statement:
-    kind = index.partition(".")[0]
     return _Statement(
-        f"{kind} quality is highest at {name} = {value:g}",
+        f"{index} quality is highest at {name} = {value:g}",
         lambda curves: curves[name].reaches_best(index, value),
         lambda curves: (
             f"highest at {curves[name].best(index):g}; at {value:g} lower by "
@@ -151,13 +153,12 @@ def _highest_at(name: str, index: str, value: float) -> _Statement:
 
 
 def _compromise(name: str, value: float, highest: str, other: str) -> _Statement:
-    kinds = highest.partition(".")[0], other.partition(".")[0]
     return _Statement(
-        f"at {name} = {value:g} {kinds[0]} quality is highest, {kinds[1]} quality slightly below its highest",
+        f"at {name} = {value:g} {highest} quality is highest, {other} quality slightly below its highest",
         lambda curves: curves[name].reaches_best(highest, value) and 0 <= curves[name].below_best(other, value) < 0.03,
         lambda curves: (
-            f"below the highest: {kinds[0]} {_percent(curves[name].below_best(highest, value))}, "
-            f"{kinds[1]} {_percent(curves[name].below_best(other, value))}"
+            f"below the highest: {highest} {_percent(curves[name].below_best(highest, value))}, "
+            f"{other} {_percent(curves[name].below_best(other, value))}"
         ),
     )
 
@@ -218,7 +219,7 @@ def published_sweep(detector: str, figure: str) -> PublishedSweep:
     for item in PUBLISHED_SWEEPS:
         if (item.detector, item.figure) == (detector, figure):
             return item
-    known = ", ".join(f"{item.detector} --figure {item.figure}" for item in PUBLISHED_SWEEPS)
+    known = ", ".join(f"figure {item.figure} of {item.detector}" for item in PUBLISHED_SWEEPS)
     raise UnknownNameError(f"{detector}: no figure {figure!r} that a sweep repeats; there is {known}")
 
 
@@ -254,6 +255,7 @@ def _declared_axis(name: str, suite: Suite) -> Axis:
 def curves_of(table: pd.DataFrame, figure: PublishedSweep, detector: str) -> dict[str, Curve]:
     """Return the curves of a sweep's tidy table, of one detector by label; parameters without means are left out."""
     curves = {}
+    evaluator = make_evaluator()
     own = table[table["detector"] == detector]
     for name in figure.parameters:
         if name not in own:
@@ -261,7 +263,7 @@ def curves_of(table: pd.DataFrame, figure: PublishedSweep, detector: str) -> dic
         line = own[own["axis"] == name]
         means: dict[str, dict[Any, float]] = {}
         for index in (_OBJECT, _PIXEL):
-            known = line[line["index"] == index].dropna(subset=["mean"])
+            known = line[line["index"] == evaluator.index(_SYMBOLS[index]).key].dropna(subset=["mean"])
             means[index] = dict(zip(known[name], known["mean"], strict=True))
         values = tuple(value for value in means[_OBJECT] if value in means[_PIXEL])
         if values:

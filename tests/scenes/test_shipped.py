@@ -1,8 +1,5 @@
 """The two real scenes inside the package: opened by name, whole, small, and in the wheel."""
 
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -71,16 +68,3 @@ def test_a_scene_folder_in_the_working_directory_comes_first(tmp_path, monkeypat
 def test_a_mistyped_name_is_answered_with_the_nearest():
     with pytest.raises(InputError, match=r"delf: no such folder \(did you mean 'delft'\?\)"):
         rb.open_scene("delf")
-
-
-def test_an_installed_package_holds_them(tmp_path):
-    copy, installed = tmp_path / "clone", tmp_path / "installed"
-    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns(".git", "docs", "__pycache__", ".*cache"))
-    # What a wheel is packed from; building the wheel itself needs packages that tests do not.
-    command = [sys.executable, "-c", "import setuptools; setuptools.setup()", "-q", "build_py", "-d", str(installed)]
-    subprocess.run(command, cwd=copy, check=True, capture_output=True)
-    for folder in map(shipped_folder, shipped_names()):
-        packed = installed / "roofbench" / "scenes" / "data" / folder.name
-        assert {file.name for file in packed.iterdir()} == {file.name for file in folder.iterdir()}
-    assert (installed / "roofbench" / "benchmark" / "suites" / "quick.toml").is_file()
-    assert not list(installed.glob("**/tests"))

@@ -69,7 +69,7 @@ def test_an_axis_without_values_takes_the_declared_ones_or_is_refused():
 
 
 def test_an_unknown_figure_is_refused_with_those_there_are():
-    with pytest.raises(UnknownNameError, match=r"improved: no figure '9'.*original --figure 8"):
+    with pytest.raises(UnknownNameError, match=r"improved: no figure '9'.*figure 8 of original"):
         published_sweep("improved", "9")
 
 

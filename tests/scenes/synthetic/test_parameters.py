@@ -45,4 +45,4 @@ def test_an_unknown_preset_is_answered_with_the_nearest():
 def test_every_parameter_says_what_it_means():
     for rule in SceneParameters.parameters().values():
         assert rule.doc, rule.name
-        assert rule.choices or (rule.minimum is not None and rule.maximum is not None), rule.name
+        assert rule.type is bool or rule.choices or (rule.minimum is not None and rule.maximum is not None), rule.name
