@@ -41,5 +41,6 @@ RECIPES: dict[str, Recipe] = {
     "cloth-filter": Recipe(file="cloth_filter", packages=("cloth-simulation-filter",)),
     "grass": Recipe(file="grass_lidar", programs=("grass",)),
     "pysmrf": Recipe(file="pysmrf_filter", packages=("pysmrf",)),
+    "saga": Recipe(file="saga_slope", programs=("saga_cmd",)),
     "whitebox": Recipe(file="whitebox_classes", packages=("whitebox-workflows",)),
 }

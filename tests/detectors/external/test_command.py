@@ -360,7 +360,7 @@ def test_the_folder_of_a_program_reveals_nothing(program, square, tmp_path, scen
     assert f"OLDPWD={os.getcwd()}" not in environment
 
 
-@pytest.mark.parametrize("recipe", ["cloth-filter", "grass", "pysmrf", "whitebox"])
+@pytest.mark.parametrize("recipe", ["cloth-filter", "grass", "pysmrf", "saga", "whitebox"])
 def test_recipes_run_or_say_what_is_missing(recipe, tmp_path):
     """A house of 12 x 16 m on a meadow: every tool that is installed finds it."""
     rng = np.random.default_rng(0)

@@ -3,6 +3,7 @@
 import re
 import shutil
 from pathlib import Path
+from subprocess import run
 
 import numpy as np
 import pytest
@@ -35,10 +36,12 @@ def scene():
     return rb.Scene("level", (500_000, 5_700_000, 500_060, 5_700_060), crs="EPSG:25832", points=points)
 
 
-@pytest.mark.parametrize(("language", "tool"), [("sh", "ogr2ogr"), ("js", "node")])
+@pytest.mark.parametrize(("language", "tool"), [("sh", "ogr2ogr"), ("js", "node"), ("r", "Rscript")])
 def test_an_example_finds_both_houses(language, tool, scene, tmp_path):
     if shutil.which(tool) is None:
         pytest.skip(f"{tool} is not installed")
+    if language == "r" and run(["Rscript", "-e", "library(sf)"], capture_output=True, check=False).returncode:
+        pytest.skip("the R package sf is not installed")
     detector = make_detector("command", {"run": str(example(language, tmp_path)), "points": "csv"})
     found = rb.detect(scene, detector)
     assert len(found) == 2
