@@ -7,5 +7,6 @@ from __future__ import annotations
 
 from .threshold_free.evaluator import ThresholdFree
 from .threshold_free.files import FileComparison, evaluate_files
+from .threshold_free.verdicts import SideVerdicts
 
-__all__ = ["FileComparison", "ThresholdFree", "evaluate_files"]
+__all__ = ["FileComparison", "SideVerdicts", "ThresholdFree", "evaluate_files"]

@@ -43,6 +43,7 @@ __all__ = [
     "VerdictKind",
     "VerdictTable",
     "Verdicts",
+    "rows_of_kinds",
 ]
 
 Side: TypeAlias = Literal["detection", "reference"]
@@ -148,6 +149,11 @@ class LazyReasons(Sequence[str]):
             yield from self[start : start + _STRETCH]
 
 
+def rows_of_kinds(kinds: Sequence[str], kind: NDArray[np.uint8], keys: Sequence[str]) -> NDArray[np.bool_]:
+    """Return where `kind`, places in `kinds`, is one of some keys, shape (n,)."""
+    return np.isin(kind, [number for number, key in enumerate(kinds) if key in keys])
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class VerdictTable:
     """The verdicts of one side, one row per object in the order of the footprints.
@@ -223,7 +229,7 @@ class VerdictTable:
 
     def where(self, *keys: str) -> NDArray[np.bool_]:
         """Return which objects have one of these verdicts, shape (n,)."""
-        return np.isin(self.kind, [number for number, key in enumerate(self.kinds) if key in keys])
+        return rows_of_kinds(self.kinds, self.kind, keys)
 
     def count(self, *keys: str) -> int:
         """Return how many objects have one of these verdicts."""

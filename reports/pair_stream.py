@@ -6,13 +6,12 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..evaluators.in_parts import SideVerdicts
 from ..evaluators.uncertainty.paired_files import PairedFiles
-from ..evaluators.verdict_table import VerdictTable
 from .qgis_style import pair_styles
 from .streamed_layers import Rows, StreamedLayer, write_streamed
 from .verdict_stream import verdict_fields, verdict_rows
@@ -57,7 +56,7 @@ def write_pair_stream(found: PairedFiles, path: str | os.PathLike[str], *, overw
 
 
 def _detections(found: PairedFiles, place: int) -> Rows:
-    return verdict_rows(next(found.tables(place)))
+    return verdict_rows(found.verdicts(place)[0])
 
 
 @contextmanager
@@ -69,10 +68,10 @@ def _references(found: PairedFiles) -> Iterator[Any]:
         kept = []
         for place, name in enumerate("ab"):
             file = Path(folder) / f"{name}.arrow"
-            table = next(islice(found.tables(place), 1, None))
-            _keep(table, file)
-            ids = table.ids
-            del table
+            verdicts = found.verdicts(place)[1]
+            _keep(verdicts, file)
+            ids = verdicts.ids
+            del verdicts
             kept.append(pyarrow.ipc.open_file(pyarrow.memory_map(str(file))).read_all())
         fates = found.comparison.fates
         assert fates is not None
@@ -89,14 +88,14 @@ def _references(found: PairedFiles) -> Iterator[Any]:
         yield lambda: Rows(ids, columns)
 
 
-def _keep(table: VerdictTable, file: Path) -> None:
+def _keep(verdicts: SideVerdicts, file: Path) -> None:
     """Write the columns that stand beside each other as an Arrow file."""
     import pyarrow
 
-    rows = verdict_rows(table)
+    rows = verdict_rows(verdicts)
     fields = [pyarrow.field(name, kind) for name, kind in verdict_fields().items() if name in _PAIRED]
     schema = pyarrow.schema(fields)
     with pyarrow.ipc.new_file(str(file), schema) as sink:
-        for begin in range(0, len(table), _BATCH):
-            columns = rows.columns(slice(begin, min(begin + _BATCH, len(table))))
+        for begin in range(0, len(verdicts), _BATCH):
+            columns = rows.columns(slice(begin, min(begin + _BATCH, len(verdicts))))
             sink.write_batch(pyarrow.record_batch([columns[name] for name in schema.names], schema=schema))

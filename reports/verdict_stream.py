@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluators.in_parts import FileComparison
-from ..evaluators.verdict_table import VerdictTable
+from ..evaluators.in_parts import FileComparison, SideVerdicts
 from .qgis_style import verdict_styles
 from .streamed_layers import Rows, StreamedLayer, write_streamed
 
@@ -24,7 +23,7 @@ def write_verdict_stream(comparison: FileComparison, path: str | os.PathLike[str
     A GeoPackage gets the layers ``detections`` and ``references``; other formats, which hold one layer, get both in
     one, distinguished by the column ``side``.
     """
-    tables, files = comparison.verdicts(), comparison.files
+    sides, files = comparison.verdicts(), comparison.files
     layers = [
         StreamedLayer(
             f"{side}s",
@@ -32,7 +31,7 @@ def write_verdict_stream(comparison: FileComparison, path: str | os.PathLike[str
             files.streams[place],
             files.repaired(place),
             verdict_fields(),
-            lambda: verdict_rows(next(tables)),
+            partial(verdict_rows, sides[place]),
         )
         for place, side in enumerate(("detection", "reference"))
     ]
@@ -58,19 +57,18 @@ def verdict_fields() -> dict[str, Any]:
     }
 
 
-def verdict_rows(table: VerdictTable) -> Rows:
+def verdict_rows(verdicts: SideVerdicts) -> Rows:
     """Return the verdicts of one side as columns."""
-    return Rows(table.ids, partial(_columns, table))
+    return Rows(verdicts.ids, partial(_columns, verdicts))
 
 
-def _columns(table: VerdictTable, part: slice) -> dict[str, Any]:
+def _columns(verdicts: SideVerdicts, part: slice) -> dict[str, Any]:
     import pyarrow
 
-    partner = table.partner[part]
-    measures = {name: values[part] for name, values in table.measures.items()}
+    table = verdicts.table(part)
     return {
-        "verdict": pyarrow.array([*table.kinds]).take(pyarrow.array(table.kind[part])),
-        "partner": pyarrow.array(partner, mask=partner < 0),
-        **{name: pyarrow.array(values, mask=np.isnan(values)) for name, values in measures.items()},
-        "reason": pyarrow.array(table.reasons[part], pyarrow.string()),
+        "verdict": pyarrow.array([*table.kinds]).take(pyarrow.array(table.kind)),
+        "partner": pyarrow.array(table.partner, mask=table.partner < 0),
+        **{name: pyarrow.array(values, mask=np.isnan(values)) for name, values in table.measures.items()},
+        "reason": pyarrow.array(table.reasons[:], pyarrow.string()),
     }

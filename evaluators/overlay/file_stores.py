@@ -37,6 +37,8 @@ __all__ = ["FileStores", "serve", "store_files"]
 
 #: Footprints of each side in one part, about.
 _PART = 200_000
+#: Integers that name buildings serve as codes where they span less than so many times their number.
+_SPARSE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +198,8 @@ def _claim(work: Path, key: str, say: Callable[[str], None]) -> None:
 
 def _read_side(task: _Task) -> None:
     """Write one file into its store."""
+    import pyarrow
+
     stream = open_stream(task.path, building_id=task.building_id, crs=task.crs)
     store = OutlineStore(task.folder, task.division)
     labels: list[Any] = []
@@ -215,6 +219,9 @@ def _read_side(task: _Task) -> None:
     entries = [[repair.id, repair.problem, repair.action] for repair in repairs]
     bounds = [*np.min(corners, axis=0).tolist(), *np.max(corners, axis=0).tolist()] if corners else None
     store.finish(codes, source=str(stream.file), repairs=entries, bounds=bounds)
+    labels.clear()
+    # Of a file of ten million footprints the pool keeps a gigabyte for later, which never comes.
+    pyarrow.default_memory_pool().release_unused()
 
 
 @contextmanager
@@ -261,6 +268,12 @@ def _building_codes(labels: list[Any]) -> NDArray[np.int64]:
     import pyarrow.compute
 
     column = pyarrow.chunked_array(labels)
+    if pyarrow.types.is_integer(column.type) and len(column) and not column.null_count:
+        extremes = pyarrow.compute.min_max(column)
+        low, high = extremes["min"].as_py(), extremes["max"].as_py()
+        if high - low < _SPARSE * len(column):  # they are codes already: a dictionary would take ten times the memory
+            numbers = (part.to_numpy() - low for part in column.chunks)
+            return np.concatenate([number.astype(np.int64) for number in numbers])
     if pyarrow.types.is_floating(column.type):
         column = pyarrow.compute.if_else(pyarrow.compute.is_nan(column), None, column)
     elif pyarrow.types.is_string(column.type) or pyarrow.types.is_large_string(column.type):

@@ -85,32 +85,38 @@ def match(
     in coordinates of millions of metres decides nothing. Ties go to the larger overlap, then to the lower reference
     row, then to the lower detection row.
     """
-    # The order decides only where an object takes part in several pairs: the others come first, unsorted.
+    # The order decides only where an object takes part in several pairs: the others are matched at once.
     several = (np.bincount(overlaps.first, minlength=counts[0])[overlaps.first] > 1) | (
         np.bincount(overlaps.second, minlength=counts[1])[overlaps.second] > 1
     )
-    lonely, contested = np.flatnonzero(~several), np.flatnonzero(several)
+    of_detection, of_reference = (np.full(count, -1, dtype=np.int64) for count in counts)
+    of_detection[overlaps.first[~several]] = overlaps.second[~several]
+    of_reference[overlaps.second[~several]] = overlaps.first[~several]
+    nearest = of_detection.copy()
+
+    contested = np.flatnonzero(several)
+    del several
+    first, second = overlaps.first[contested], overlaps.second[contested]
     rounded, area = np.round(distances[contested], DECIMALS), np.round(overlaps.area[contested], DECIMALS)
-    ties = (overlaps.first[contested], overlaps.second[contested])
-    by_distance = np.concatenate([lonely, contested[np.lexsort((*ties, -area, rounded))]])
-    nearest = _first_of_each(overlaps.first[by_distance], overlaps.second[by_distance], counts[0])
+    order = np.lexsort((first, second, -area, rounded))
+    _put_first(nearest, first[order], second[order])
     if matching == "one-pass":
-        claims = by_distance[nearest[overlaps.first[by_distance]] == overlaps.second[by_distance]]
-        of_reference = _first_of_each(overlaps.second[claims], overlaps.first[claims], counts[1])
-        of_detection = np.full(counts[0], -1, dtype=np.int64)
-        claimed = np.flatnonzero(of_reference >= 0)
+        order = order[nearest[first[order]] == second[order]]
+        _put_first(of_reference, second[order], first[order])
+        claimed = np.unique(second[order])
         of_detection[of_reference[claimed]] = claimed
         return Correspondence(of_detection, of_reference, nearest)
-    order = by_distance
     if matching == "overlap":
-        order = np.concatenate([lonely, contested[np.lexsort((*ties, rounded, -area))]])
-    of_detection, of_reference = accept_in_order(overlaps.first[order], overlaps.second[order], counts)
+        order = np.lexsort((first, second, rounded, -area))
+    detections, one = np.unique(first[order], return_inverse=True)
+    references, two = np.unique(second[order], return_inverse=True)
+    partner, holder = accept_in_order(one, two, (len(detections), len(references)))
+    of_detection[detections[partner >= 0]] = references[partner[partner >= 0]]
+    of_reference[references[holder >= 0]] = detections[holder[holder >= 0]]
     return Correspondence(of_detection, of_reference, nearest)
 
 
-def _first_of_each(keys: NDArray[np.int64], values: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Return for each key 0..count-1 the first value that stands beside it, or -1."""
-    first = np.full(count, -1, dtype=np.int64)
+def _put_first(column: NDArray[np.int64], rows: NDArray[np.int64], values: NDArray[np.int64]) -> None:
+    """Set `column` at each of `rows` to the first value that stands beside it."""
     # Later assignments win, so the reversed order leaves the first.
-    first[keys[::-1]] = values[::-1]
-    return first
+    column[rows[::-1]] = values[::-1]

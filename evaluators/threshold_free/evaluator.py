@@ -211,12 +211,12 @@ class ThresholdFree(Evaluator):
 
 
 def _verdicts(graph: OverlapGraph, outlines: PairDistances, detected: Footprints, reference: Footprints) -> Verdicts:
-    tables = find_verdicts(graph, outlines.outline)
+    sides = find_verdicts(graph, outlines.outline)
     return Verdicts(
         kinds=VERDICT_KINDS,
         measures=MEASURES,
-        detection_table=tables[0],
-        reference_table=tables[1],
+        detection_table=sides[0].whole(),
+        reference_table=sides[1].whole(),
         detected=detected,
         reference=reference,
     )

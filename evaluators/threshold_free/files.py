@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,9 +10,9 @@ from pathlib import Path
 from ...scenes.geodata.footprint_stream import FootprintStream
 from ..overlay.file_stores import FileStores, store_files
 from ..overlay.left_out import repair_notes
-from ..verdict_table import VerdictTable
 from .evaluator import ThresholdFree, ThresholdFreeEvaluation
 from .partitioned import evaluate_stores, require_exact
+from .verdicts import SideVerdicts
 
 __all__ = ["FileComparison", "evaluate_files"]
 
@@ -25,13 +25,13 @@ class FileComparison:
     ----------
     evaluation : ThresholdFreeEvaluation
     verdicts : callable
-        Returns an iterator over the verdict tables of both sides.
+        Returns the verdicts of the detections and of the references.
     files : FileStores
         Detected and reference.
     """
 
     evaluation: ThresholdFreeEvaluation
-    verdicts: Callable[[], Iterator[VerdictTable]]
+    verdicts: Callable[[], tuple[SideVerdicts, SideVerdicts]]
     files: FileStores
 
 

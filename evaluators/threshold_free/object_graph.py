@@ -21,6 +21,10 @@ from .correspondence import Correspondence, match
 __all__ = ["ObjectGraph", "OverlapGraph", "object_graph", "overlap_graph"]
 
 
+#: Pairs measured at a time.
+_CHUNK = 1 << 18
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OverlapGraph:
     """Two sets of objects with their overlaps and matches.
@@ -177,6 +181,10 @@ def _linked(
 
 
 def _centre_distances(detected: Objects, reference: Objects, pairs: Overlaps) -> NDArray[np.float64]:
-    offsets = detected.centres[pairs.first] - reference.centres[pairs.second]
-    distances: NDArray[np.float64] = np.hypot(offsets[:, 0], offsets[:, 1])
+    one, two = detected.centres, reference.centres
+    distances = np.empty(len(pairs))
+    for start in range(0, len(pairs), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        offsets = one[pairs.first[part]] - two[pairs.second[part]]
+        distances[part] = np.hypot(offsets[:, 0], offsets[:, 1])
     return distances

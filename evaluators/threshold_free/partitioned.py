@@ -7,7 +7,7 @@ and any order of the two files. (Only exact ties between candidate pairs are dec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
@@ -25,12 +25,11 @@ from ..overlay.outline_store import OutlineStore, StoredObjects
 from ..overlay.overlaps import Overlaps
 from ..overlay.partition import PairTable, PartGraph, find_pairs, united_from_stores
 from ..overlay.reference_overlaps import reference_overlap_notes
-from ..verdict_table import VerdictTable
 from .counting import count_buildings, count_objects, natural_overlaps, pair_sums
 from .evaluator import ThresholdFree, ThresholdFreeEvaluation
 from .object_graph import OverlapGraph, overlap_graph
 from .tallies import LiteralAreas, Scenes, ThresholdFreeTallies
-from .verdicts import verdict_tables
+from .verdicts import SideVerdicts, find_verdicts
 
 __all__ = ["Links", "block_tallies", "evaluate_links", "evaluate_stores", "link_stores", "require_exact"]
 
@@ -41,9 +40,9 @@ class Links(NamedTuple):
     graph: OverlapGraph
     outlines: PairDistances
 
-    def tables(self) -> Iterator[VerdictTable]:
-        """Yield the verdict table of the detections, then that of the references."""
-        return verdict_tables(self.graph, self.outlines.outline)
+    def verdicts(self) -> tuple[SideVerdicts, SideVerdicts]:
+        """Return the verdicts of the detections and of the references."""
+        return find_verdicts(self.graph, self.outlines.outline)
 
 
 def require_exact(evaluator: ThresholdFree) -> None:
@@ -62,7 +61,7 @@ def evaluate_stores(
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
     executor: Executor | None = None,
-) -> tuple[ThresholdFreeEvaluation, Callable[[], Iterator[VerdictTable]]]:
+) -> tuple[ThresholdFreeEvaluation, Callable[[], tuple[SideVerdicts, SideVerdicts]]]:
     """Compare two sets on disk.
 
     Parameters
@@ -82,7 +81,7 @@ def evaluate_stores(
     evaluation : ThresholdFreeEvaluation
         Without verdicts, which would need all outlines at once.
     verdicts : callable
-        Returns an iterator over the verdict tables of both sides.
+        Returns the verdicts of the detections and of the references.
 
     Raises
     ------
@@ -92,7 +91,7 @@ def evaluate_stores(
     require_exact(evaluator)
     pairs = find_pairs((detected, reference), [(0, 1)], folder, progress=progress, executor=executor)
     links = link_stores(evaluator, pairs, (0, 1))
-    return evaluate_links(evaluator, links, (detected, reference)), links.tables
+    return evaluate_links(evaluator, links, (detected, reference)), links.verdicts
 
 
 def link_stores(evaluator: ThresholdFree, pairs: PartGraph, places: tuple[int, int]) -> Links:

@@ -1,26 +1,23 @@
 """Verdicts of the threshold-free evaluation: what each object counts as, and why, in words.
 
-Everything follows from the object graph. The words are written only when they are asked for, since a city has a million
-of them.
+Everything follows from the object graph. A table can be made of some rows at a time, since a nation has ten million of
+them.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..overlay.left_out import Objects
-from ..verdict_table import LazyReasons, Measure, VerdictKind, VerdictTable
-from .correspondence import DECIMALS, Correspondence
+from ..verdict_table import LazyReasons, Measure, VerdictKind, VerdictTable, rows_of_kinds
 from .object_graph import OverlapGraph
+from .reasons import Neighbours, Words
 
-__all__ = ["MEASURES", "VERDICT_KINDS", "find_verdicts", "verdict_tables"]
+__all__ = ["MEASURES", "VERDICT_KINDS", "SideVerdicts", "find_verdicts"]
 
 VERDICT_KINDS = (
     VerdictKind(key="TP", label="detected building", side="detection", role="correct", counts_as="correct"),
@@ -39,57 +36,44 @@ MEASURES = (
     Measure(key="rmse", title="corner distance", unit="m"),
 )
 
-_Texts: TypeAlias = NDArray[np.object_]
-
 _DETECTION_KINDS = tuple(kind.key for kind in VERDICT_KINDS if kind.side == "detection")
 _REFERENCE_KINDS = tuple(kind.key for kind in VERDICT_KINDS if kind.side == "reference")
 
 
-class _Neighbours:
-    """For each object of one side, the objects of the other side that it overlaps, nearest first."""
+@dataclass(frozen=True, eq=False)
+class SideVerdicts:
+    """The verdicts of one side, of which a table is made for some rows at a time.
 
-    def __init__(
-        self, own: NDArray[np.int64], other: NDArray[np.int64], distances: NDArray[np.float64], count: int
-    ) -> None:
-        # Half the memory: a nation has ten million objects and more pairs, but never 2^31.
-        self.count = np.bincount(own, minlength=count).astype(np.int32)
-        self._start = np.zeros(count + 1, dtype=np.int32)
-        np.cumsum(self.count, out=self._start[1:])
-        self._pair = np.argsort(own, kind="stable").astype(np.int32)
-        # Only objects with several neighbours need an order among them.
-        several = np.flatnonzero(self.count[own[self._pair]] > 1)
-        pair = self._pair[several]
-        order = np.lexsort((other[pair], np.round(distances[pair], DECIMALS), own[pair]))
-        self._pair[several] = pair[order]
-        self._other = other[self._pair].astype(np.int32)
+    Attributes
+    ----------
+    ids : ndarray of int64, shape (n,)
+        Row of each object in its source.
+    kinds : tuple of str
+    kind : ndarray of uint8, shape (n,)
+        Place of each verdict in `kinds`.
+    table : callable
+        Takes a slice of rows with start and stop, and returns their `VerdictTable`.
+    """
 
-    def nearest(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the nearest neighbour of objects that have one."""
-        return self._other[self._start[rows]].astype(np.int64)
+    ids: NDArray[np.int64]
+    kinds: tuple[str, ...]
+    kind: NDArray[np.uint8]
+    table: Callable[[slice], VerdictTable]
 
-    def of(self, rows: NDArray[np.int64]) -> list[list[int]]:
-        """Return all neighbours of some objects."""
-        begins, counts = self._start[rows], self.count[rows]
-        ends = np.cumsum(counts)
-        flat = self._other[np.arange(counts.sum()) + np.repeat(begins - ends + counts, counts)].tolist()
-        return [flat[end - count : end] for end, count in zip(ends.tolist(), counts.tolist(), strict=True)]
+    def __len__(self) -> int:
+        return len(self.ids)
 
-    def nearest_pair(self) -> NDArray[np.int64]:
-        """Return for each object the position of its nearest pair in the overlaps, or -1."""
-        pair = np.full(len(self.count), -1, dtype=np.int64)
-        some = self.count > 0
-        pair[some] = self._pair[self._start[:-1][some]]
-        return pair
+    def where(self, *keys: str) -> NDArray[np.bool_]:
+        """Return which objects have one of these verdicts, shape (n,)."""
+        return rows_of_kinds(self.kinds, self.kind, keys)
+
+    def whole(self) -> VerdictTable:
+        """Return the table of all rows."""
+        return self.table(slice(0, len(self)))
 
 
-def find_verdicts(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> tuple[VerdictTable, VerdictTable]:
-    """Write one row per detection and one per reference; see `verdict_tables`."""
-    detections, references = verdict_tables(graph, pair_outline)
-    return detections, references
-
-
-def verdict_tables(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> Iterator[VerdictTable]:
-    """Yield the table of the detections, then that of the references, so that one at a time may be in memory.
+def find_verdicts(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> tuple[SideVerdicts, SideVerdicts]:
+    """Return the verdicts of the detections and of the references.
 
     The partner of an object without a match is the nearest one that it overlaps. ``rmse`` is given for TP only.
 
@@ -99,55 +83,107 @@ def verdict_tables(graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> It
     pair_outline : ndarray, shape (number of TP pairs,)
         Outline distance of each TP pair, by detection, m.
     """
-    pairs = graph.overlaps
-    of_detection = _Neighbours(pairs.first, pairs.second, graph.distances, len(graph.detected))
-    of_reference = _Neighbours(pairs.second, pairs.first, graph.distances, len(graph.reference))
-    words = _Words(graph, of_detection, of_reference, _Claims.of(graph))
-    yield _detection_table(graph, pair_outline, of_detection, words)
-    yield _reference_table(graph, pair_outline, of_reference, words)
+    tables = _Tables(graph, pair_outline)
+    return tables.detections(), tables.references()
 
 
-def _detection_table(
-    graph: OverlapGraph, pair_outline: NDArray[np.float64], neighbours: _Neighbours, words: _Words
-) -> VerdictTable:
-    match = graph.correspondence
-    matched = match.of_detection >= 0
-    kind = np.where(matched, 0, np.where(neighbours.count > 0, 1, 2)).astype(np.uint8)
-    kind[~graph.detections.mask] = 3
-    position = neighbours.nearest_pair()
-    rows = match.pairs[0]
-    position[rows] = graph.matched_overlaps
-    partner, measures = _measured(graph, position, graph.detected, graph.reference.ids, graph.overlaps.second)
-    measures["rmse"] = _spread(pair_outline, rows, len(graph.detected))
-    return VerdictTable(
-        ids=graph.detected.ids,
-        kinds=_DETECTION_KINDS,
-        kind=kind,
-        partner=partner,
-        measures=measures,
-        reasons=LazyReasons(len(kind), partial(words.of_detections, kind, measures)),
-    )
+class _Tables:
+    """What the tables of both sides are made of; see `find_verdicts`."""
+
+    def __init__(self, graph: OverlapGraph, pair_outline: NDArray[np.float64]) -> None:
+        pairs = graph.overlaps
+        self._graph, self._pair_outline = graph, pair_outline
+        self._of_detection = Neighbours(pairs.first, pairs.second, graph.distances, len(graph.detected))
+        self._of_reference = Neighbours(pairs.second, pairs.first, graph.distances, len(graph.reference))
+        self._words = Words(graph, self._of_detection, self._of_reference)
+        # Place among the TP pairs of each detection that has a match.
+        self._rank = np.cumsum(graph.correspondence.of_detection >= 0, dtype=np.int32) - np.int32(1)
+
+    def detections(self) -> SideVerdicts:
+        graph = self._graph
+        kind = np.full(len(graph.detected), 2, dtype=np.uint8)
+        kind[self._of_detection.count(slice(None)) > 0] = 1
+        kind[graph.correspondence.of_detection >= 0] = 0
+        kind[~graph.detections.mask] = 3
+        return SideVerdicts(graph.detected.ids, _DETECTION_KINDS, kind, partial(self._detection_table, kind))
+
+    def references(self) -> SideVerdicts:
+        graph = self._graph
+        kind = np.ones(len(graph.reference), dtype=np.uint8)
+        kind[graph.correspondence.of_reference >= 0] = 0
+        kind[~graph.references.mask] = 2
+        return SideVerdicts(graph.reference.ids, _REFERENCE_KINDS, kind, partial(self._reference_table, kind))
+
+    def _detection_table(self, every: NDArray[np.uint8], part: slice) -> VerdictTable:
+        graph, kind = self._graph, every[part]
+        matched = np.flatnonzero(graph.correspondence.of_detection[part] >= 0)
+        pair = self._of_detection.nearest_pairs(part)
+        measures = self._measures(pair, matched, self._rank[part][matched])
+
+        def words(rows: slice) -> NDArray[np.object_]:
+            return self._words.of_detections(part.start + rows.start, kind[rows], measures["distance"][rows])
+
+        return VerdictTable(
+            ids=graph.detected.ids[part],
+            kinds=_DETECTION_KINDS,
+            kind=kind,
+            partner=_partners(pair, graph.overlaps.second, graph.reference.ids),
+            measures=measures,
+            reasons=LazyReasons(len(kind), words),
+        )
+
+    def _reference_table(self, every: NDArray[np.uint8], part: slice) -> VerdictTable:
+        graph, kind = self._graph, every[part]
+        detections = graph.correspondence.of_reference[part]
+        matched = np.flatnonzero(detections >= 0)
+        pair = self._of_reference.nearest_pairs(part)
+        measures = self._measures(pair, matched, self._rank[detections[matched]])
+
+        def words(rows: slice) -> NDArray[np.object_]:
+            columns = measures["distance"][rows], measures["overlap_area"][rows]
+            return self._words.of_references(part.start + rows.start, kind[rows], *columns)
+
+        return VerdictTable(
+            ids=graph.reference.ids[part],
+            kinds=_REFERENCE_KINDS,
+            kind=kind,
+            partner=_partners(pair, graph.overlaps.first, graph.detected.ids),
+            measures=measures,
+            reasons=LazyReasons(len(kind), words),
+        )
+
+    def _measures(
+        self, pair: NDArray[np.int64], matched: NDArray[np.int64], rank: NDArray[np.int32]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Put the pairs of matched objects into `pair`, and return the measures of each object's pair.
+
+        Parameters
+        ----------
+        pair : ndarray of int64, shape (n,)
+            Place of each object's nearest pair in the overlaps, or -1.
+        matched : ndarray of int64
+            Objects with a match.
+        rank : ndarray of int32
+            Place of these among the TP pairs.
+        """
+        graph = self._graph
+        pair[matched] = graph.matched_overlaps[rank]
+        some = np.flatnonzero(pair >= 0)
+        chosen = pair[some]
+        return {
+            "distance": _spread(graph.distances[chosen], some, len(pair)),
+            "overlap_area": _spread(graph.overlaps.area[chosen], some, len(pair)),
+            "iou": _spread(graph.iou(chosen), some, len(pair)),
+            "rmse": _spread(self._pair_outline[rank], matched, len(pair)),
+        }
 
 
-def _reference_table(
-    graph: OverlapGraph, pair_outline: NDArray[np.float64], neighbours: _Neighbours, words: _Words
-) -> VerdictTable:
-    match = graph.correspondence
-    kind = np.where(match.of_reference >= 0, 0, 1).astype(np.uint8)
-    kind[~graph.references.mask] = 2
-    position = neighbours.nearest_pair()
-    rows = match.pairs[1]
-    position[rows] = graph.matched_overlaps
-    partner, measures = _measured(graph, position, graph.reference, graph.detected.ids, graph.overlaps.first)
-    measures["rmse"] = _spread(pair_outline, rows, len(graph.reference))
-    return VerdictTable(
-        ids=graph.reference.ids,
-        kinds=_REFERENCE_KINDS,
-        kind=kind,
-        partner=partner,
-        measures=measures,
-        reasons=LazyReasons(len(kind), partial(words.of_references, kind, measures)),
-    )
+def _partners(pair: NDArray[np.int64], rows: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the id of the other object of each pair, -1 where there is none."""
+    partners = np.full(len(pair), -1, dtype=np.int64)
+    some = pair >= 0
+    partners[some] = ids[rows[pair[some]]]
+    return partners
 
 
 def _spread(values: NDArray[np.float64], rows: NDArray[np.int64], count: int) -> NDArray[np.float64]:
@@ -155,178 +191,3 @@ def _spread(values: NDArray[np.float64], rows: NDArray[np.int64], count: int) ->
     column = np.full(count, np.nan)
     column[rows] = values
     return column
-
-
-def _measured(
-    graph: OverlapGraph,
-    position: NDArray[np.int64],
-    own: Objects,
-    other_ids: NDArray[np.int64],
-    other_rows: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], dict[str, NDArray[np.float64]]]:
-    """Return the id of each object's partner, and the measures of the overlap at `position` (-1: none)."""
-    has = np.flatnonzero(position >= 0)
-    pair = position[has]
-    partner = np.full(len(own), -1, dtype=np.int64)
-    partner[has] = other_ids[other_rows[pair]]
-    return partner, {
-        "distance": _spread(graph.distances[pair], has, len(own)),
-        "overlap_area": _spread(graph.overlaps.area[pair], has, len(own)),
-        "iou": _spread(graph.iou(pair), has, len(own)),
-    }
-
-
-def _names(ids: list[int]) -> str:
-    """Return some ids in words: ``12``, ``12 and 13``, ``12, 13, 14 and 4 more``."""
-    if len(ids) == 1:
-        return str(ids[0])
-    if len(ids) > 3:
-        return f"{', '.join(map(str, ids[:3]))} and {len(ids) - 3} more"
-    return f"{', '.join(map(str, ids[:-1]))} and {ids[-1]}"
-
-
-def _share(part: float) -> str:
-    return f"{100 * part:.0f} %" if part >= 0.01 else "less than 1 %"
-
-
-def _claimed(pieces: int, times: int, subject: str = "") -> str:
-    text = f"; {subject}split into {pieces} detections" if pieces > 1 else ""
-    return text + (f"; {subject}detected {times} times" if times > 1 else "")
-
-
-@dataclass(frozen=True, eq=False)
-class _Claims:
-    """How often each reference is detected.
-
-    Attributes
-    ----------
-    pieces : ndarray of int32
-        Detections that are matched with a reference or are pieces of it: more than one where it is split.
-    times : ndarray of int32
-        Detections that are matched with it or duplicate that one: more than one where it is detected again.
-    match : Correspondence
-    """
-
-    pieces: NDArray[np.int32]
-    times: NDArray[np.int32]
-    match: Correspondence
-
-    @classmethod
-    def of(cls, graph: OverlapGraph) -> _Claims:
-        match = graph.correspondence
-        multiple = graph.detections.mask & (match.of_detection < 0) & (match.booked_on >= 0)
-        found = (match.of_reference >= 0).astype(np.int32)
-
-        def booked(kind: NDArray[np.bool_]) -> NDArray[np.int32]:
-            return np.bincount(match.booked_on[multiple & kind], minlength=len(found)).astype(np.int32)
-
-        return cls(found + booked(~graph.duplicates), found + booked(graph.duplicates), match)
-
-    def home(self, detections: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the reference that each of some detections is matched with or booked on, or -1."""
-        partner = self.match.of_detection[detections]
-        return np.where(partner >= 0, partner, self.match.booked_on[detections])
-
-
-class _Words:
-    """Reasons in words, for a stretch of rows at a time."""
-
-    def __init__(
-        self, graph: OverlapGraph, of_detection: _Neighbours, of_reference: _Neighbours, claims: _Claims
-    ) -> None:
-        self._graph = graph
-        self._of_detection, self._of_reference = of_detection, of_reference
-        self._claims = claims
-
-    def of_detections(
-        self, kind: NDArray[np.uint8], measures: Mapping[str, NDArray[np.float64]], part: slice
-    ) -> _Texts:
-        claims, graph = self._claims, self._graph
-        texts = np.full(part.stop - part.start, "false alarm: overlaps no reference", dtype=object)
-        verdict = kind[part]
-        texts[verdict == 3] = graph.detections.reasons_of(part)[verdict == 3]
-
-        found = part.start + np.flatnonzero(verdict == 0)
-        own = claims.home(found)
-        columns = (graph.reference.ids[own], measures["distance"][found], claims.pieces[own], claims.times[own])
-        texts[found - part.start] = [
-            f"found reference {name}, shifted {moved:.1f} m"
-            + (_claimed(pieces, times, "the reference is ") if pieces > 1 or times > 1 else "")
-            for name, moved, pieces, times in zip(*(column.tolist() for column in columns), strict=True)
-        ]
-
-        multiple = part.start + np.flatnonzero(verdict == 1)
-        own = claims.home(multiple)
-        holder = graph.detected.ids[graph.correspondence.of_reference[own]]
-        columns = (graph.reference.ids[own], holder, claims.pieces[own], graph.duplicates[multiple])
-        texts[multiple - part.start] = [
-            f"duplicate of detection {first} on reference {name}"
-            if duplicate
-            else f"piece of reference {name}, which is split into {pieces} detections and represented by "
-            f"detection {first}"
-            for name, first, pieces, duplicate in zip(*(column.tolist() for column in columns), strict=True)
-        ]
-
-        wide = part.start + np.flatnonzero((verdict < 2) & (self._of_detection.count[part] > 1))
-        for row, own_row, neighbours in zip(
-            wide.tolist(), claims.home(wide).tolist(), self._of_detection.of(wide), strict=True
-        ):
-            others = _names(graph.reference.ids[[other for other in neighbours if other != own_row]].tolist())
-            texts[row - part.start] += f"; also covers part of reference {others}"
-        return texts
-
-    def of_references(
-        self, kind: NDArray[np.uint8], measures: Mapping[str, NDArray[np.float64]], part: slice
-    ) -> _Texts:
-        graph, overlapping = self._graph, self._of_reference.count
-        texts = np.full(part.stop - part.start, "missed: no detection overlaps it", dtype=object)
-        verdict = kind[part]
-        texts[verdict == 2] = graph.references.reasons_of(part)[verdict == 2]
-        found = part.start + np.flatnonzero(verdict == 0)
-        texts[found - part.start] = self._found(found, measures["distance"][found])
-        missed = part.start + np.flatnonzero((verdict == 1) & (overlapping[part] > 0))
-        covered = measures["overlap_area"][missed] / graph.reference.areas[missed]
-        texts[missed - part.start] = self._missed(missed, covered)
-        return texts
-
-    def _found(self, rows: NDArray[np.int64], moved: NDArray[np.float64]) -> list[str]:
-        claims, graph = self._claims, self._graph
-        own = graph.correspondence.of_reference[rows]
-        columns = (graph.detected.ids[own], moved, claims.pieces[rows], claims.times[rows])
-        texts = [
-            f"found by detection {name}, shifted {distance:.1f} m"
-            + (_claimed(pieces, times) if pieces > 1 or times > 1 else "")
-            for name, distance, pieces, times in zip(*(column.tolist() for column in columns), strict=True)
-        ]
-        wide = np.flatnonzero(self._of_detection.count[own] > 1)
-        for place, row, neighbours in zip(
-            wide.tolist(), rows[wide].tolist(), self._of_detection.of(own[wide]), strict=True
-        ):
-            others = _names(graph.reference.ids[[other for other in neighbours if other != row]].tolist())
-            texts[place] += f"; the detection also covers part of reference {others}"
-        shared = np.flatnonzero(self._of_reference.count[rows] > claims.pieces[rows] + claims.times[rows] - 1)
-        covering = self._of_reference.of(rows[shared])
-        homes = iter(claims.home(np.fromiter(itertools.chain(*covering), dtype=np.int64)).tolist())
-        for place, row, neighbours in zip(shared.tolist(), rows[shared].tolist(), covering, strict=True):
-            strangers = [other for other in neighbours if next(homes) != row]
-            names = _names(graph.detected.ids[strangers].tolist())
-            texts[place] += (
-                f"; detection {names} of another reference covers part of it"
-                if len(strangers) == 1
-                else f"; detections {names} of other references cover parts of it"
-            )
-        return texts
-
-    def _missed(self, rows: NDArray[np.int64], covered: NDArray[np.float64]) -> list[str]:
-        graph = self._graph
-        nearest = self._of_reference.nearest(rows)
-        matched = graph.correspondence.of_detection[nearest] >= 0
-        # Without a match only where a detection has a single choice (one-pass matching).
-        home = graph.reference.ids[self._claims.home(nearest)]
-        columns = (graph.detected.ids[nearest], home, matched, covered)
-        return [
-            f"merged with reference {other} into detection {name}, which covers {_share(share)} of it"
-            if has
-            else f"missed: detection {name} overlaps it ({_share(share)}) but is booked on reference {other}"
-            for name, other, has, share in zip(*(column.tolist() for column in columns), strict=True)
-        ]

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 import shapely
@@ -32,12 +32,23 @@ from ..comparison import evaluate
 from ..given_footprints import GivenFootprints, GivenReference, given_sets
 from ..index import Index
 from ..registry import DEFAULT, make_evaluator
-from ..verdict_table import VerdictKind, VerdictTable
+from ..verdict_table import CountsAs, VerdictKind
 from .blocks import Blocks, spatial_blocks
 from .intervals import RESAMPLES, Interval, block_tallies, interval_of, require_level, resampled_values
 from .redrawn import Redraws
 
-__all__ = ["FATES", "Difference", "Fate", "PairedComparison", "compare", "fates_of", "mcnemar_p", "paired"]
+__all__ = [
+    "FATES",
+    "Difference",
+    "Fate",
+    "Found",
+    "PairedComparison",
+    "compare",
+    "fates_of",
+    "found_of",
+    "mcnemar_p",
+    "paired",
+]
 
 Fate: TypeAlias = Literal["both", "only A", "only B", "neither", "left out"]
 #: In the order of tables and legends.
@@ -45,6 +56,26 @@ FATES: tuple[Fate, ...] = ("both", "only A", "only B", "neither", "left out")
 
 #: Level of McNemar's test in percent where no interval is asked for.
 _LEVEL = 95.0
+
+
+class Found(NamedTuple):
+    """Which references a set of detections finds.
+
+    Attributes
+    ----------
+    correct, left_out : ndarray of bool, shape (number of references,)
+        Which count as correct, and which do not count.
+    """
+
+    correct: NDArray[np.bool_]
+    left_out: NDArray[np.bool_]
+
+
+class _Verdicts(Protocol):
+    """Verdicts of one side."""
+
+    def where(self, *keys: str) -> NDArray[np.bool_]:
+        """Return which objects have one of these verdicts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,10 +276,12 @@ def compare(
         )
         for place, (whole, found) in enumerate(zip(evaluations, (a, b), strict=True))
     ]
-    verdicts = [evaluation.verdicts for evaluation in evaluations]
-    fates = None
-    if verdicts[0] is not None and verdicts[1] is not None:
-        fates = fates_of(verdicts[0].kinds, (verdicts[0].reference_table, verdicts[1].reference_table))
+    found = [
+        found_of(verdicts.kinds, verdicts.reference_table)
+        for evaluation in evaluations
+        if (verdicts := evaluation.verdicts) is not None
+    ]
+    fates = fates_of(found[0], found[1]) if len(found) == 2 else None
     return paired((evaluations[0], evaluations[1]), (resampled[0], resampled[1]), fates, blocks, interval)
 
 
@@ -301,23 +334,27 @@ def mcnemar_p(only_first: int, only_second: int) -> float:
     return min(1.0, 2 * float(special.bdtr(min(only_first, only_second), only_first + only_second, 0.5)))
 
 
-def fates_of(kinds: Sequence[VerdictKind], tables: tuple[VerdictTable, VerdictTable]) -> NDArray[np.object_]:
-    """Return the fate of each reference from its verdicts in A and in B.
+def found_of(kinds: Sequence[VerdictKind], verdicts: _Verdicts) -> Found:
+    """Return which references count as found.
 
     Parameters
     ----------
     kinds : sequence of VerdictKind
         Those of the evaluator.
-    tables : tuple of VerdictTable
+    verdicts : VerdictTable or SideVerdicts
         Of the references.
     """
-    keys = {
-        effect: [kind.key for kind in kinds if kind.side == "reference" and kind.counts_as == effect]
-        for effect in ("correct", "neutral")
-    }
-    a, b = (table.where(*keys["correct"]) for table in tables)
+
+    def counting_as(effect: CountsAs) -> NDArray[np.bool_]:
+        return verdicts.where(*(kind.key for kind in kinds if kind.side == "reference" and kind.counts_as == effect))
+
+    return Found(counting_as("correct"), counting_as("neutral"))
+
+
+def fates_of(one: Found, two: Found) -> NDArray[np.object_]:
+    """Return the fate of each reference from what A and what B finds."""
+    a, b = one.correct, two.correct
     fates = np.full(len(a), "neither", dtype=object)
     fates[a & b], fates[a & ~b], fates[~a & b] = "both", "only A", "only B"
-    for table in tables:
-        fates[table.where(*keys["neutral"])] = "left out"
+    fates[one.left_out | two.left_out] = "left out"
     return fates

@@ -5,7 +5,7 @@ Blocks, fates and intervals are those of `compare`; of the graphs of A and of B,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,10 +18,10 @@ from ..overlay.left_out import repair_notes
 from ..overlay.partition import PartGraph, find_pairs
 from ..threshold_free.evaluator import ThresholdFree
 from ..threshold_free.partitioned import block_tallies, evaluate_links, link_stores, require_exact
-from ..verdict_table import VerdictTable
+from ..threshold_free.verdicts import SideVerdicts
 from .blocks import Blocks, linked_blocks
 from .intervals import require_level, resampled_values
-from .paired import PairedComparison, fates_of, paired
+from .paired import PairedComparison, fates_of, found_of, paired
 
 __all__ = ["PairedFiles", "compare_files"]
 
@@ -47,9 +47,9 @@ class PairedFiles:
     pairs: PartGraph
     evaluator: ThresholdFree
 
-    def tables(self, place: int) -> Iterator[VerdictTable]:
-        """Yield the verdict tables of the detections and of the references; `place` is 0 for A, 1 for B."""
-        yield from link_stores(self.evaluator, self.pairs, (place, 2)).tables()
+    def verdicts(self, place: int) -> tuple[SideVerdicts, SideVerdicts]:
+        """Return the verdicts of the detections and of the references; `place` is 0 for A, 1 for B."""
+        return link_stores(self.evaluator, self.pairs, (place, 2)).verdicts()
 
 
 def compare_files(
@@ -93,21 +93,20 @@ def compare_files(
     pairs = find_pairs(files.stores, _COUPLES, work / "pairs", progress=progress, executor=executor)
     blocks = _blocks(pairs)
     say(f"resampling {blocks.count} blocks")
-    evaluations, resampled, tables = [], [], []
+    evaluations, resampled, found = [], [], []
     for place in (0, 1):
         links = link_stores(evaluator, pairs, (place, 2))
         evaluation = evaluate_links(evaluator, links, (files.stores[place], files.stores[2]))
         notes = (*repair_notes(files.repairs(place), files.repairs(2)), *evaluation.notes)
         evaluations.append(replace(evaluation, notes=notes))
-        *_, references = links.tables()
-        tables.append(replace(references, measures={}, reasons=("",) * len(references)))
-        del links, references
+        found.append(found_of(evaluator.verdict_kinds, links.verdicts()[1]))
+        del links
         labels = blocks.labels[place], blocks.labels[2]
         every = block_tallies(evaluator, pairs, (place, 2), labels, blocks.count)
         resampled.append(resampled_values(evaluation, every))
-    fates = fates_of(evaluator.verdict_kinds, (tables[0], tables[1]))
-    found = paired((evaluations[0], evaluations[1]), (resampled[0], resampled[1]), fates, blocks, interval)
-    return PairedFiles(found, files, pairs, evaluator)
+    fates = fates_of(found[0], found[1])
+    comparison = paired((evaluations[0], evaluations[1]), (resampled[0], resampled[1]), fates, blocks, interval)
+    return PairedFiles(comparison, files, pairs, evaluator)
 
 
 def _blocks(pairs: PartGraph) -> Blocks:

@@ -136,7 +136,7 @@ def test_verdicts_partners_and_measures_are_those_of_plain_loops(seed):
     graph = object_graph(rb.Footprints.of(detected), rb.Footprints.of(reference, building_ids=building))
     rows = zip(*(side.tolist() for side in graph.correspondence.pairs), strict=True)
     outline = np.array([outline_distance(detected[d], reference[r]) for d, r in rows])
-    table, reference_table = find_verdicts(graph, outline)
+    table, reference_table = (side.whole() for side in find_verdicts(graph, outline))
     matches, nearest = correspondence(detected, reference)
     for d in range(len(detected)):
         expected = "TP" if d in matches else "MD" if d in nearest else "FP"
