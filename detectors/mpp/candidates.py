@@ -34,6 +34,11 @@ _PIECES = 12
 _LEAST_RIM = 12
 #: A patch that fills this share of its bounding rectangle also gives that one: light wells and towers are holes in it.
 _FILLED = 0.85
+#: Cells and radians by which boxes differ that are not the same.
+_ALIKE = 5e-4
+#: Fractions of a cell to which places and sides are rounded: a power of two, so that a box is the same to the last bit
+#: whatever cell of it a window of the scene begins with, and equally large boxes stay equally large.
+_FRACTIONS = 1024
 
 
 def propose_boxes(
@@ -69,10 +74,10 @@ def propose_boxes(
         boxes += _boxes_of_patches(labels, count, finer, least_cells, threads)
         finer = labels
     together = np.concatenate(boxes)
-    rounded = np.round(together, 3)
-    order = np.lexsort(rounded.T)
+    together[:, :4] = np.round(together[:, :4] * _FRACTIONS) / _FRACTIONS
+    order = np.lexsort(together.T)
     first = np.ones(len(order), dtype=np.bool_)
-    first[1:] = (rounded[order[1:]] != rounded[order[:-1]]).any(axis=1)
+    first[1:] = (np.abs(together[order[1:]] - together[order[:-1]]) > _ALIKE).any(axis=1)
     return together[np.sort(order[first])]
 
 

@@ -30,7 +30,6 @@ import numpy as np
 from ...core.kernels import kernel
 from .arrays import Heights, Integers, Labels, Mask, Rectangles, States
 from .cells import HIGH, LOW, VOID
-from .patches import patch_sizes
 from .rectangles import overlap_area, row_span
 from .reshaping import move_edge
 from .selection import ordered_value
@@ -73,7 +72,7 @@ class _Surface(NamedTuple):
     labels : ndarray of int32, shape (rows, columns)
         Patches, 0 elsewhere.
     sizes : ndarray of int64, shape (count + 1,)
-        Cells of each patch.
+        Cells of each patch; those of patches that are no storeys whatever they look like exceed every box.
     step : int
         Centimetres.
     """
@@ -98,7 +97,7 @@ def lower_storeys(
     state: States,
     roofs: Heights,
     labels: Labels,
-    count: int,
+    sizes: Integers,
     boxes: Rectangles,
     step: int,
     *,
@@ -116,15 +115,16 @@ def lower_storeys(
     roofs : ndarray of int32, shape (rows, columns)
         Centimetres before anything is lowered, walls at the height of the roof beside them.
     labels : ndarray of int32, shape (rows, columns)
-        Patches from 1 to `count`, 0 elsewhere.
-    count : int
+        Patches from 1, 0 elsewhere.
+    sizes : ndarray of int64, shape (count + 1,)
+        Cells of each patch; those of patches that are no storeys whatever they look like exceed every box.
     boxes : ndarray, shape (n, 5)
         Largest first.
     step : int
         Centimetres.
     threads : Threads
     """
-    surface = _Surface(height, state, roofs, labels, patch_sizes(labels, count, threads=threads), step)
+    surface = _Surface(height, state, roofs, labels, sizes, step)
     wave = np.zeros(len(boxes), dtype=np.int64) if threads.count == 1 else _waves(boxes, *height.shape)
     for turn in range(wave.max(initial=-1) + 1):
         batch = boxes[wave == turn]

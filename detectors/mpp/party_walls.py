@@ -42,6 +42,9 @@ _STEP_NOISE, _VALLEY_NOISE = 0.12, 0.25
 #: Share of the lines that must have heights for a step, and for a valley.
 _KNOWN_STEP, _KNOWN_VALLEY = 0.6, 0.5
 
+#: Fractions of a cell that places of the lattice are rounded to.
+_FRACTIONS = 1024
+
 
 class WallRule(NamedTuple):
     """What makes a party wall of a step or of a valley.
@@ -105,8 +108,8 @@ def party_walls(
     stations = np.arange(_LATTICE / 2, length, _LATTICE)
     lines = np.arange(_LATTICE / 2, depth, _LATTICE)[1:-1]
     x, y = (place[0] + stations[:, None, None] * u + lines[None, :, None] * v).transpose(2, 0, 1) / grid.gsd
-    column = np.clip(x.astype(np.int64), 0, grid.columns - 1)
-    row = np.clip(y.astype(np.int64), 0, grid.rows - 1)
+    column = np.clip(_cell_of(x), 0, grid.columns - 1)
+    row = np.clip(_cell_of(y), 0, grid.rows - 1)
     profile = np.where(state[row, column] == HIGH, height[row, column] / 100.0, np.nan)
     found: list[float] = []
     strength = wall_strength(profile, rule)
@@ -120,6 +123,11 @@ def party_walls(
     if not found or np.median(np.diff([0.0, *found, length])) > _WIDEST:
         return []
     return [Wall((place[0] + at * u) / grid.gsd, v) for at in found]
+
+
+def _cell_of(place: Floats) -> NDArray[np.int64]:
+    """Return the cells of places in cells; on a border the same one whatever cell a window of the scene begins with."""
+    return np.floor(np.round(place * _FRACTIONS) / _FRACTIONS).astype(np.int64)
 
 
 def wall_strength(profile: Floats, rule: WallRule) -> Floats:

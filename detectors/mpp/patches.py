@@ -28,7 +28,16 @@ from .arrays import Heights, Integers, Labels, Mask, States
 from .cells import VOID
 from .threads import ONE_THREAD, Threads
 
-__all__ = ["Division", "Rims", "cells_of_patches", "count_rims", "divide_patches", "label_patches", "patch_sizes"]
+__all__ = [
+    "Division",
+    "Rims",
+    "cells_of_patches",
+    "count_rims",
+    "divide_patches",
+    "label_patches",
+    "longer_patches",
+    "patch_sizes",
+]
 
 
 class Division(NamedTuple):
@@ -39,11 +48,14 @@ class Division(NamedTuple):
     row, column : int
         Number of the first row and column, counted from the origin of the CRS.
     side : int
+    longest : int
+        Longer patches are divided. A window whose halo is as wide shows of every patch of its core how long it is.
     """
 
     row: int
     column: int
     side: int
+    longest: int
 
 
 def label_patches(
@@ -76,7 +88,7 @@ def label_patches(
 
 
 def divide_patches(labels: Labels, count: int, division: Division) -> tuple[Labels, int]:
-    """Divide the patches that are longer than a square, along rows or columns, at the borders of the squares, in place.
+    """Divide long patches, measured along rows or columns, at the borders of the squares, in place.
 
     No building is so long. A terrace or a wood can be, and what is made of it must not depend on its far end, which a
     window may not show. Return the labels, pieces after all others, and how many there are.
@@ -84,7 +96,7 @@ def divide_patches(labels: Labels, count: int, division: Division) -> tuple[Labe
     from scipy.ndimage import find_objects
 
     for number, place in enumerate(find_objects(labels, count), start=1):
-        if place is None or max(part.stop - part.start for part in place) <= division.side:
+        if place is None or max(part.stop - part.start for part in place) <= division.longest:
             continue
         part = labels[place]
         row, column = np.nonzero(part == number)
@@ -175,6 +187,22 @@ def patch_sizes(labels: Labels, count: int, *, threads: Threads = ONE_THREAD) ->
     """Return how many cells have each label, shape (count + 1,), 0 for label 0."""
     tallies = threads.bands(lambda first, last: _tally(labels, count, first, last), len(labels))
     return np.asarray(np.sum(tallies, axis=0))
+
+
+@kernel
+def longer_patches(labels: Labels, count: int, longest: int) -> Mask:
+    """Return which patches are longer, along rows or columns, than so many cells, shape (count + 1,)."""
+    rows, columns = labels.shape
+    top, bottom = np.full(count + 1, rows, dtype=np.int64), np.full(count + 1, -1, dtype=np.int64)
+    left, right = np.full(count + 1, columns, dtype=np.int64), np.full(count + 1, -1, dtype=np.int64)
+    for r in range(rows):
+        for c in range(columns):
+            label = labels[r, c]
+            if label > 0:
+                top[label], bottom[label] = min(top[label], r), r
+                left[label], right[label] = min(left[label], c), max(right[label], c)
+    found: Mask = np.maximum(bottom - top, right - left) >= longest
+    return found
 
 
 def cells_of_patches(labels: Labels, count: int, *, threads: Threads = ONE_THREAD) -> tuple[Labels, Integers]:

@@ -39,6 +39,8 @@ __all__ = ["Prepared", "prepare", "survey_textures", "weights_of"]
 
 #: Square metres: largest rough place that counts as a structure of the roof around it, smallest box that is proposed.
 _LARGEST_STRUCTURE, _SMALLEST_BOX = 40.0, 6.0
+#: Sides of a square that a patch may be long before it is divided: less than the halo has.
+_LONGEST_PATCH = 1.5
 #: Metres: steps between neighbouring cells that the patches of boxes may hold; a low one separates houses of different
 #: height, one that is never reached keeps a block together.
 _BOX_STEPS = (0.4, 1.0, 1000.0)
@@ -110,9 +112,8 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
 
 def _division(parameters: MPPParameters, grid: Grid) -> Division:
     """Return the squares at whose borders long patches are divided."""
-    return Division(
-        -round(grid.north / grid.gsd), round(grid.west / grid.gsd), round(side_of(parameters.largest_side) / grid.gsd)
-    )
+    side = round(side_of(parameters.largest_side) / grid.gsd)
+    return Division(-round(grid.north / grid.gsd), round(grid.west / grid.gsd), side, round(_LONGEST_PATCH * side))
 
 
 def _rated(rectangles: Rectangles, tables: Tables, model: Model, threads: Threads) -> Boxes:
@@ -171,6 +172,7 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
             step=parameters.roof_step,
             share=parameters.carried_share,
             most=int(_LARGEST_STRUCTURE / cell**2),
+            division=_division(parameters, grid),
             threads=threads,
         )
         cells = replace(cells, height=height, state=state)

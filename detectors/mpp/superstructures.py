@@ -7,7 +7,8 @@ patch, rim
     height between two roofs, and roof structures), which take the height of the roof beside them that is nearer in
     height (`roughness`). Crowns belong to none.
 superstructure
-    A patch whose rim is lower roof nearly all round. A house in a row is none: its front and back stand free.
+    A patch that is not too long (`patches.Division`) and whose rim is lower roof nearly all round. A house in a row is
+    none: its front and back stand free.
 roof structure
     A small rough area with roof nearly all round: chimneys, ducts, a terrace with plants.
 
@@ -25,7 +26,7 @@ from .arrays import Heights, Labels, Mask, States
 from .candidates import propose_boxes
 from .cells import HIGH, LOW
 from .frames import lower_storeys
-from .patches import count_rims, label_patches
+from .patches import Division, count_rims, label_patches, longer_patches, patch_sizes
 from .roughness import assign_rough_cells
 from .threads import ONE_THREAD, Threads
 
@@ -41,6 +42,8 @@ _ROUNDS = 5
 _ANY = 1 << 30
 #: States of the cells that are to be lowered.
 _DONE, _WAITING, _NEXT = np.uint8(0), np.uint8(1), np.uint8(2)
+#: Cells of patches that are too long for storeys.
+_TOO_MANY = np.int64(1) << 40
 
 
 def lower_superstructures(
@@ -51,6 +54,7 @@ def lower_superstructures(
     step: float,
     share: float,
     most: int,
+    division: Division | None = None,
     threads: Threads = ONE_THREAD,
 ) -> tuple[Heights, States]:
     """Return heights and states with superstructures lowered to the roofs that carry them, and their shadows filled.
@@ -68,12 +72,15 @@ def lower_superstructures(
         Share of the rim that must be lower roof; more than 1 changes nothing.
     most : int
         Largest number of cells of a roof structure.
+    division : Division, optional
+        Squares at whose borders long patches are divided before frames are searched. Long patches are no
+        superstructures: what is decided at a place must not depend on what a window of the scene does not show.
     threads : Threads
     """
     if share > 1:
         return height, state
     limit = round(100 * step)
-    lowered, state = _lower_storeys(height, state, roof, limit, threads)
+    lowered, state = _lower_storeys(height, state, roof, limit, division, threads)
     labels, count = label_patches(lowered, roof, limit, threads=threads)
     assign_rough_cells(lowered, state, labels, threads=threads)
     if _level_structures(lowered, state, labels, share, most, threads):
@@ -81,12 +88,23 @@ def lower_superstructures(
     for turn in range(_ROUNDS):
         if turn > 0:
             labels, count = label_patches(lowered, labels, limit, threads=threads)
-        if not _lower(lowered, state, labels, count, share, limit, threads):
+        rims = count_rims(labels, count, lowered, state, labels, fall=1, threads=threads)
+        chosen = rims.carried(share) & ~_too_long(labels, count, division)
+        if not _lower_to_roof(lowered, labels, labels, chosen, -limit // 2, threads):
             break
     return lowered, state
 
 
-def _lower_storeys(height: Heights, state: States, roof: Mask, step: int, threads: Threads) -> tuple[Heights, States]:
+def _too_long(labels: Labels, count: int, division: Division | None) -> Mask:
+    """Return which patches are so long that a division divides them, shape (count + 1,)."""
+    if division is None:
+        return np.zeros(count + 1, dtype=np.bool_)
+    return np.asarray(longer_patches(labels, count, division.longest))
+
+
+def _lower_storeys(
+    height: Heights, state: States, roof: Mask, step: int, division: Division | None, threads: Threads
+) -> tuple[Heights, States]:
     """Return heights and states with the storeys of frames lowered."""
     rows, columns = state.shape
     smooth, lowered, filled = np.empty_like(height), np.empty_like(height), np.empty_like(state)
@@ -108,12 +126,14 @@ def _lower_storeys(height: Heights, state: States, roof: Mask, step: int, thread
     threads.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
     boxes = np.concatenate(
         [
-            propose_boxes(smooth, solid, steps=(1e6,), least_cells=24, threads=threads),
-            propose_boxes(smooth, labels, steps=(0.01 * step,), least_cells=24, threads=threads),
+            propose_boxes(smooth, mask, steps=(metres,), least_cells=24, division=division, threads=threads)
+            for mask, metres in ((solid, 1e6), (labels, 0.01 * step))
         ]
     )
-    boxes = boxes[np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")]
-    lower_storeys(lowered, filled, smooth, labels, count, boxes, step, threads=threads)
+    boxes = boxes[np.lexsort((boxes[:, 4], boxes[:, 0], boxes[:, 1], -boxes[:, 2] * boxes[:, 3]))]
+    sizes = patch_sizes(labels, count, threads=threads)
+    sizes[_too_long(labels, count, division)] = _TOO_MANY
+    lower_storeys(lowered, filled, smooth, labels, sizes, boxes, step, threads=threads)
     return lowered, filled
 
 
@@ -169,20 +189,6 @@ def _level_structures(
     areas, count = label_patches(height, rough_cells, _ANY, threads=threads)
     rims = count_rims(areas, count, height, state, labels, fall=-_ANY, threads=threads)
     return _lower_to_roof(height, labels, areas, rims.carried(share) & (rims.cells <= most), _ANY, threads)
-
-
-def _lower(
-    height: Heights,
-    state: States,
-    labels: Labels,
-    count: int,
-    share: float,
-    step: int,
-    threads: Threads,
-) -> bool:
-    """Lower the superstructures in place; return whether there was any."""
-    rims = count_rims(labels, count, height, state, labels, fall=1, threads=threads)
-    return _lower_to_roof(height, labels, labels, rims.carried(share), -step // 2, threads)
 
 
 def _lower_to_roof(

@@ -40,6 +40,8 @@ _ROWS = 100
 _SEAM_SWEEPS, _SEAM_ROOM = 4, 64
 #: Share of the energy of a rectangle by which an edge that closes a wall may raise it.
 _WALL_TOLERANCE = 0.25
+#: Fractions of a cell, and of a radian, that the order of rectangles distinguishes.
+_FRACTIONS = 64
 
 
 def sample_scene(
@@ -76,10 +78,15 @@ def sample_scene(
         rectangles = process_squares(rounds.greedy, rectangles, started, largest=largest, threads=threads)
     rectangles = process_squares(rounds.chains, rectangles, annealed, largest=largest, groups=1, threads=threads)
     rectangles = process_squares(rounds.shifted, rectangles, joined, largest=largest, threads=threads)
-    rectangles = np.ascontiguousarray(rectangles[np.lexsort(rectangles.T)])
+    rectangles = _ordered(rectangles)
     close_walls(tables, model, rectangles, _WALL_TOLERANCE * parameters.price)
     rectangles = absorb_strips(tables, model, rectangles, slender=parameters.slender, part_share=parameters.part_share)
     return rectangles, [results[key] for key in sorted(results)]
+
+
+def _ordered(rectangles: Rectangles) -> Rectangles:
+    """Return the rectangles by angle, sides and place; what differs by rounding alone does not change their order."""
+    return np.ascontiguousarray(rectangles[np.lexsort(np.round(rectangles * _FRACTIONS).T)])
 
 
 def _schedule(parameters: MPPParameters, square: Square, cell: float, boxes: int) -> Schedule:

@@ -22,6 +22,10 @@ from .raster import Grid
 
 __all__ = ["coverage_of_mask", "minimum_rectangles", "simplify", "trace"]
 
+#: Fractions of a metre to which traced places are rounded: a power of two, so that an outline is the same to the last
+#: bit in every window of a scene, and what is decided by ties (which vertex is farthest) is decided alike.
+_FRACTIONS = 65536
+
 
 def coverage_of_mask(mask: NDArray[np.bool_], share: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
     """Return the coverage whose outline encloses exactly the centres of a mask's cells.
@@ -65,7 +69,8 @@ def trace(coverage: NDArray[np.float32], grid: Grid) -> NDArray[np.object_]:
     rings, offsets = filled
     polygons = np.empty(len(rings), dtype=object)
     for number, (points, offset) in enumerate(zip(rings, offsets, strict=True)):
-        parts = [points[a:b] for a, b in itertools.pairwise(offset)]
+        places = np.round(points * _FRACTIONS) / _FRACTIONS
+        parts = [places[a:b] for a, b in itertools.pairwise(offset)]
         polygons[number] = shapely.Polygon(parts[0], parts[1:])
     invalid = ~shapely.is_valid(polygons)
     if invalid.any():

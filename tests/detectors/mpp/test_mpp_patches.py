@@ -15,6 +15,7 @@ from roofbench.detectors.mpp.patches import (
     count_rims,
     divide_patches,
     label_patches,
+    longer_patches,
     patch_sizes,
 )
 from roofbench.detectors.mpp.rectangles import corners
@@ -187,13 +188,39 @@ def test_patches_longer_than_a_square_are_divided_at_borders_that_do_not_depend_
     roof = rng.random((60, 70)) < 0.5
     roof[20:24] = True
     height = np.full(roof.shape, 500, np.int32)
-    whole, count = divide_patches(*label_patches(height, roof, 10), Division(100, 200, 16))
+    whole, count = divide_patches(*label_patches(height, roof, 10), Division(100, 200, 16, 16))
     sizes = [(np.ptp(row), np.ptp(column)) for row, column in (np.nonzero(whole == k) for k in range(1, count + 1))]
     assert max(max(size) for size in sizes) < 16
     assert np.array_equal(whole > 0, roof)
     # Pieces of a window, 24 cells inside it, are those of the whole.
     part = np.s_[7:60, 5:70]
-    seen, _ = divide_patches(*label_patches(height[part], roof[part], 10), Division(107, 205, 16))
+    seen, _ = divide_patches(*label_patches(height[part], roof[part], 10), Division(107, 205, 16, 16))
     inner, same = seen[24:-24, 24:-24], whole[part][24:-24, 24:-24]
     pairs = np.unique(np.stack([inner.ravel(), same.ravel()]), axis=1)
     assert len(np.unique(pairs[0])) == len(np.unique(pairs[1])) == pairs.shape[1] > 5
+
+
+def test_a_patch_is_longer_than_so_many_cells_along_rows_or_columns():
+    rng = np.random.default_rng(5)
+    labels, count = label_patches(np.zeros((40, 50), np.int32), rng.random((40, 50)) < 0.6, 10)
+    long = longer_patches(labels, count, 8)
+    extents = [max(np.ptp(axis) for axis in np.nonzero(labels == k)) + 1 for k in range(1, count + 1)]
+    assert long[1:].tolist() == [extent > 8 for extent in extents]
+    assert 0 < long.sum() < count
+    assert not long[0]
+
+
+def test_boxes_do_not_depend_on_where_a_window_begins_to_the_last_bit():
+    rng = np.random.default_rng(6)
+    row, column = np.mgrid[:90, :90]
+    roof = np.zeros((90, 90), dtype=bool)
+    for x, y, angle in rng.uniform([12, 12, 0], [78, 78, 1.5], (12, 3)):
+        u = (column - x) * np.cos(angle) + (row - y) * np.sin(angle)
+        v = (row - y) * np.cos(angle) - (column - x) * np.sin(angle)
+        roof |= (abs(u) < 9) & (abs(v) < 5)
+    height = np.full(roof.shape, 600, np.int32)
+    boxes = propose_boxes(height, roof, steps=(1.0,), least_cells=12)
+    moved = np.pad(roof, ((1031, 5), (2057, 3)))
+    others = propose_boxes(np.full(moved.shape, 600, np.int32), moved, steps=(1.0,), least_cells=12)
+    assert np.array_equal(others - [2057, 1031, 0, 0, 0], boxes)
+    assert len(boxes) > 5

@@ -74,3 +74,16 @@ def test_minimum_rectangles_hold_their_polygons():
     (rectangle,) = minimum_rectangles(polygons)
     assert rectangle.buffer(1e-6).contains(polygons[0])
     assert shapely.get_num_coordinates(rectangle) == 5
+
+
+@pytest.mark.parametrize("gsd", [0.35, 0.1, 0.5])
+def test_an_outline_is_the_same_to_the_last_bit_in_every_window(gsd):
+    rng = np.random.default_rng(3)
+    share = rng.random((40, 50)).astype(np.float32)
+    mask = np.zeros(share.shape, dtype=bool)
+    mask[12:30, 14:38] = rng.random((18, 24)) < 0.8
+    coverage, place = coverage_of_mask(mask, share), Grid.covering((84000, 447000, 84000 + 50 * gsd, 447000), gsd)
+    grid = Grid(place.west, place.north, gsd, *mask.shape)
+    whole, part = trace(coverage, grid), trace(coverage[7:, 9:], grid.cut(slice(7, 40), slice(9, 50)))
+    assert len(whole) == len(part) > 0
+    assert shapely.equals_exact(whole, part, 0.0).all()
