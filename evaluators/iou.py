@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.parameters import parameter
-from .average_precision import AP_THRESHOLDS, Ranking, average_precision
+from .average_precision import AP_THRESHOLDS, Ranking
 from .coverage_evaluator import CoverageEvaluator
 from .index import IndexGroup, index, ratio
 from .overlay.coverage import CountedSets
@@ -108,8 +108,7 @@ class IoUIndices(IndexGroup):
 
 
 def _precision_at(t: _Tallies, place: int) -> float | None:
-    hits = (t.ranking.hits >> place) & 1 == 1
-    return average_precision(t.ranking.scores, hits, t.counts.reference)
+    return t.ranking.average_precision(place, t.counts.reference)
 
 
 def _mean_precision(t: _Tallies) -> float | None:
@@ -118,8 +117,7 @@ def _mean_precision(t: _Tallies) -> float | None:
 
 
 def _mean_recall(t: _Tallies) -> float | None:
-    hits = [int(((t.ranking.hits >> place) & 1).sum()) for place in range(len(AP_THRESHOLDS))]
-    return ratio(float(np.mean(hits)), t.counts.reference)
+    return ratio(float(t.ranking.found.mean()), t.counts.reference)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,8 +38,8 @@ class Additive(Protocol):
     def from_json(self, stored: Any) -> Any:
         """Return one of the same layout with the content that `to_json` gave."""
 
-    def weighted_sum(self, values: Sequence[Any], weights: NDArray[np.int64]) -> Any:
-        """Return the sum of `values`, each taken as many times as its weight says."""
+    def weighted_sums(self, values: Sequence[Any], weights: NDArray[np.int64]) -> Iterator[Any]:
+        """Yield sums of `values`, each taken as many times as its weight says: one sum for each row of `weights`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,11 +142,11 @@ class Histogram:
         counts[stored["bin"]], sums[stored["bin"]] = stored["count"], stored["sum"]
         return dataclasses.replace(self, counts=counts, sums=sums)
 
-    def weighted_sum(self, values: Sequence[Histogram], weights: NDArray[np.int64]) -> Self:
-        """Return the sum of histograms, each taken as many times as its weight says."""
-        counts = np.tensordot(weights, np.stack([value.counts for value in values]), 1)
-        sums = np.tensordot(weights.astype(np.float64), np.stack([value.sums for value in values]), 1)
-        return dataclasses.replace(self, counts=counts, sums=sums)
+    def weighted_sums(self, values: Sequence[Histogram], weights: NDArray[np.int64]) -> Iterator[Self]:
+        """Yield sums of histograms, each taken as many times as its weight says; see `Additive`."""
+        counts, sums = (np.stack([getattr(value, name) for value in values]) for name in ("counts", "sums"))
+        for row in weights:
+            yield dataclasses.replace(self, counts=row @ counts, sums=row.astype(np.float64) @ sums)
 
 
 def histogram(*, low: float, high: float, bins: int) -> Callable[[], Histogram]:
@@ -252,7 +252,8 @@ class Tallies:
         if isinstance(default, int | float):
             numbers = np.array(values, dtype=np.int64 if isinstance(default, int) else np.float64)
             return iter((weights @ numbers).tolist())
-        return (default.weighted_sum(values, row) for row in weights)
+        found: Iterator[Any] = default.weighted_sums(values, weights)
+        return found
 
 
 def _defaults(kind: type[Tallies]) -> dict[str, Any]:

@@ -331,11 +331,10 @@ def _matrix(report: Report) -> dict[str, Any] | None:
 
 def _published(report: Report) -> dict[str, Any] | None:
     comparison: Comparison | None = report.comparison
-    if comparison is None or not report.boards:
+    if comparison is None:
         return None
-    indices = [index for index in report.boards[0].indices if any(row.text(index) for row, _ in comparison.rows)]
     return {
-        "indices": indices,
+        "indices": comparison.indices,
         "rows": comparison.rows,
         "checks": [(source, list(found)) for source, found in groupby(checks(), key=lambda check: check.source)],
     }

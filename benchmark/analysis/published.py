@@ -53,6 +53,11 @@ class PublishedRow:
     printed: Mapping[str, str]
     average: bool = False
 
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Labels of the detector entries that stand beside the row, the first one first."""
+        return _ENTRIES.get(self.detector, (self.detector,))
+
     def text(self, index: Index) -> str:
         """Return what is printed for an index, which has the papers' symbol; empty where a paper gives no value."""
         return self.printed.get(index.symbol, "")
@@ -71,6 +76,14 @@ def _row(
         average=average,
     )
 
+
+#: Entries other than the default one. The references of 2013 are rectangles, one for each part of a building, so the
+#: default level of `mpp`, one footprint for each building, does not stand beside them.
+_ENTRIES = {
+    "original": ("original", "original[mode=paper]", "original[mode=program]"),
+    "improved": ("improved", "improved[mode=paper]", "improved[mode=program]"),
+    "mpp": ("mpp[level=part]", "mpp-printed"),
+}
 
 _OBJECT = "C_m C_r Q_l M_d D_o C_rd C_rr"
 _AREA = "C_mp C_rp Q_lp A_oe A_ce B_f M_f"
@@ -144,10 +157,12 @@ PUBLISHED: tuple[PublishedRow, ...] = (
 
 @dataclass(frozen=True, kw_only=True)
 class OursRow:
-    """Our values on the presets of a published row: means over scenes by index key.
+    """The values of one detector entry on the presets of a published row: means over scenes by index key.
 
     Attributes
     ----------
+    label : str
+        Of the detector entry.
     scenes : int
     values : mapping of str to float
     one_pass : mapping of str to float
@@ -155,6 +170,7 @@ class OursRow:
         by it.
     """
 
+    label: str
     scenes: int
     values: Mapping[str, float | None]
     one_pass: Mapping[str, float | None] = field(default_factory=dict)
@@ -162,9 +178,17 @@ class OursRow:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Published rows, each with our row where the detector ran on presets that follow its description."""
+    """Published rows, each with our rows where a detector entry ran on all presets that follow its description.
 
-    rows: tuple[tuple[PublishedRow, OursRow | None], ...]
+    Attributes
+    ----------
+    indices : tuple of Index
+        Those that a paper prints.
+    rows : tuple of (PublishedRow, tuple of OursRow)
+    """
+
+    indices: tuple[Index, ...]
+    rows: tuple[tuple[PublishedRow, tuple[OursRow, ...]], ...]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -137,8 +137,7 @@ def fill_report(
         curves=tuple(filter(None, (pooled_curves(store, good, one, _labels(board)) for one, _ in evaluated))),
         sensitivities=tuple(found),
         costs=_costs(store, good, _labels(board)),
-        # The printed rows are by the default evaluator: another one's figures do not stand beside them.
-        comparison=_comparison(store, good, values, keyed.evaluator) if keyed.evaluator.name == DEFAULT else None,
+        comparison=_comparison(store, good, [one for one, _ in evaluated]),
         gate=gate,
         provenance=_provenance(store, rows),
     )
@@ -169,11 +168,16 @@ def _costs(store: Store, rows: Sequence[RunRow], labels: Sequence[str]) -> tuple
     )
 
 
-def _comparison(store: Store, rows: Sequence[RunRow], values: Values, evaluator: Evaluator) -> Comparison | None:
+def _comparison(store: Store, rows: Sequence[RunRow], evaluated: Sequence[KeyedEvaluator]) -> Comparison | None:
     """Return the published rows with ours; None when no detector of theirs ran on a preset of theirs.
 
     Ours stand there twice: as evaluated, and by the paper's text on correspondence taken literally.
     """
+    # The printed rows are by the default evaluator: another one's figures do not stand beside them.
+    keyed = next((one for one in evaluated if one.evaluator.name == DEFAULT), None)
+    if keyed is None:
+        return None
+    evaluator, values = keyed.evaluator, store.index_values([row.id for row in rows], keyed.key)
     literal = make_evaluator(DEFAULT, {**evaluator.values(), "matching": "one-pass"})
     one_pass = None if literal == evaluator else _EvaluatedAgain(store, literal)
     by_preset: dict[tuple[str, str], list[RunRow]] = {}
@@ -183,10 +187,14 @@ def _comparison(store: Store, rows: Sequence[RunRow], values: Values, evaluator:
             by_preset.setdefault((row.label, recipe.place), []).append(row)
     pairs = []
     for published in PUBLISHED:
-        own = [row for preset in published.presets for row in by_preset.get((published.detector, preset), ())]
-        complete = all((published.detector, preset) in by_preset for preset in published.presets)
-        pairs.append((published, _ours(own, values, one_pass) if complete and own else None))
-    return Comparison(tuple(pairs)) if any(ours for _, ours in pairs) else None
+        entries = []
+        for label in published.entries:
+            of_presets = [by_preset.get((label, preset), []) for preset in published.presets]
+            if all(of_presets):
+                entries.append(_ours(label, [row for own in of_presets for row in own], values, one_pass))
+        pairs.append((published, tuple(entries)))
+    indices = tuple(index for index in evaluator.indices if any(row.text(index) for row in PUBLISHED))
+    return Comparison(indices, tuple(pairs)) if any(ours for _, ours in pairs) else None
 
 
 class _EvaluatedAgain(dict[int, Mapping[str, float | None]]):
@@ -204,8 +212,9 @@ class _EvaluatedAgain(dict[int, Mapping[str, float | None]]):
         return self.setdefault(run_id, found)
 
 
-def _ours(rows: Sequence[RunRow], values: Values, one_pass: _EvaluatedAgain | None) -> OursRow:
+def _ours(label: str, rows: Sequence[RunRow], values: Values, one_pass: _EvaluatedAgain | None) -> OursRow:
     return OursRow(
+        label=label,
         scenes=len({row.scene for row in rows}),
         values=_means(rows, values),
         one_pass={} if one_pass is None else _means(rows, {row.id: one_pass[row.id] for row in rows}),

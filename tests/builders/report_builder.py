@@ -124,7 +124,10 @@ def make_report(labels=("first", "second"), scenes=("hamlet-1", "hamlet-2"), tit
             for label in labels
             for place, name in enumerate(scenes, start=1)
         ),
-        "comparison": Comparison(tuple((row, OursRow(scenes=3, values={"object.quality": 0.8})) for row in PUBLISHED)),
+        "comparison": Comparison(
+            MAIN,
+            tuple((row, (OursRow(label="ndsm", scenes=3, values={"object.quality": 0.8}),)) for row in PUBLISHED),
+        ),
     }
     return Report(
         title=title,

@@ -229,7 +229,7 @@ def page() -> str:
             sources = sorted({index.source for index in evaluator.indices})
             parts += [
                 f"## {name}",
-                f"{evaluator.description} Sources: {'; '.join(sources)}.",
+                f"{evaluator.description()} Sources: {'; '.join(sources)}.",
                 *_table(name),
             ]
     return "\n\n".join(parts) + "\n"

@@ -21,11 +21,13 @@ def main():
     print("|---|---|---|" + "--:|" * len(SYMBOLS))
     for published, ours in report.comparison.rows:
         rows = [("published", [published.text(index) for index in indices])]
-        if ours is not None:
-            for name, values in (("nearest", ours.values), ("one-pass", ours.one_pass)):
-                rows.append((name, [number_text(values.get(index.key), index.unit) for index in indices]))
-        for name, cells in rows:
-            print(f"| `{published.detector}` | {published.scene} | {name} | " + " | ".join(cells) + " |")
+        rows = [(published.detector, *row) for row in rows]
+        for entry in ours:
+            for name, values in (("nearest", entry.values), ("one-pass", entry.one_pass)):
+                cells = [number_text(values.get(index.key), index.unit) for index in indices]
+                rows.append((entry.label, name, cells))
+        for label, name, cells in rows:
+            print(f"| `{label}` | {published.scene} | {name} | " + " | ".join(cells) + " |")
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import pytest
 from harness.command_line import roofbench
 
 import roofbench as rb
-from roofbench.benchmark.analysis.published import PublishedRow
+from roofbench.benchmark.analysis.published import PUBLISHED, PublishedRow
 from roofbench.benchmark.analysis.report_contents import fill_report, newest_runs
 from roofbench.benchmark.store.writer import Store
 from roofbench.reports.html_report import html_report
@@ -72,11 +72,32 @@ def test_the_row_by_one_pass_stands_beside_ours_and_the_published(tmp_path, monk
             ).object.quality
             for run in rows
         ]
-    ((_, ours),) = filled.comparison.rows
+    ((_, (ours,)),) = filled.comparison.rows
     assert ours.one_pass["object.quality"] == pytest.approx(sum(one_pass) / len(one_pass))
     page = html_report(filled)
     assert "ours, 1 scene, one-pass" in page
     assert "91.0" in page
+
+
+def test_published_rows_of_parts_stand_beside_the_level_of_parts(tmp_path, monkeypatch):
+    entries = {row.detector: row.entries for row in PUBLISHED}
+    assert entries["mpp"] == ("mpp[level=part]", "mpp-printed")
+    assert entries["original"][0] == "original"
+    assert entries["dempster-shafer"] == ("dempster-shafer",)
+    monkeypatch.setattr("roofbench.benchmark.analysis.published._ENTRIES", {"ndsm": ("ndsm[height=4]", "ndsm[dem=no]")})
+    rb.run(scenes=["moonee-ponds-small"], detectors=["ndsm", "ndsm[height=4]"], store=tmp_path / "runs.sqlite")
+    row = PublishedRow(
+        detector="ndsm", scene="small", presets=("moonee-ponds-small",), source="2010", printed={"Q_l": "91.0"}
+    )
+    monkeypatch.setattr("roofbench.benchmark.analysis.report_contents.PUBLISHED", (row,))
+    with Store(tmp_path / "runs.sqlite") as opened:
+        filled = fill_report(opened, newest_runs(opened), title="published")
+        without = fill_report(opened, newest_runs(opened, detector="ndsm"), title="only the default")
+    assert [index.symbol for index in filled.comparison.indices] == ["Q_l"]
+    ((_, ours),) = filled.comparison.rows
+    assert [entry.label for entry in ours] == ["ndsm[height=4]"]
+    assert "ndsm[height=4], moonee-ponds-small" in html_report(filled)
+    assert without.comparison is None
 
 
 def test_counts_by_size_are_those_of_the_leaderboard(filled):
