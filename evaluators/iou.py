@@ -13,7 +13,7 @@ file changes nothing; with distinct confidences the value is COCO's.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -27,7 +27,7 @@ from .overlay.coverage import CountedSets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
 from .overlay.greedy import accept_in_order
 from .overlay.left_out import Counted, LeftOut
-from .overlay.overlaps import overlaps_between
+from .overlay.overlaps import Overlaps, overlaps_between
 from .tally import Tallies
 from .verdict_table import Measure, Verdicts
 
@@ -195,6 +195,8 @@ class _Candidates:
         Number of detections and of references.
     scores : ndarray, shape (number of detections,)
         Confidence, or best IoU.
+    region : ndarray, shape (number of detections,)
+        Largest IoU with an ignore region, 0 without any.
     """
 
     detection: NDArray[np.int64]
@@ -202,6 +204,11 @@ class _Candidates:
     iou: NDArray[np.float64]
     counts: tuple[int, int]
     scores: NDArray[np.float64]
+    region: NDArray[np.float64]
+
+    def ignored(self, threshold: float, partner: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which detections match an ignore region and nothing else."""
+        return (partner < 0) & (self.region >= threshold)
 
     def match(self, threshold: float, *, above: bool = False) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the partners at a threshold: pairs of at least (or only above) that IoU."""
@@ -238,19 +245,21 @@ class IoU(CoverageEvaluator):
 
     def measured(self, sets: CountedSets) -> tuple[Tallies, Callable[[], Verdicts]]:
         """Return the tallies of two sets, and how their verdicts are found."""
-        if self.matching == "coco":
-            sets = self._with_ignore_regions(sets)
         candidates = self._candidates(sets)
-        d, r = sets.detections.mask, sets.references.mask
+        ranked = sets.detections.mask if self.matching == "spacenet" else sets.detections.code != 1
         of_detection, of_reference = candidates.match(self.threshold)
+        sets = self._with_ignored(sets, candidates, of_detection)
+        d, r = sets.detections.mask, sets.references.mask
         flipped = np.zeros(2, dtype=np.int64)
         moved = [candidates.match(self.threshold + shift) for shift in (-_SHIFT, _SHIFT)]
         for side, (mask, now) in enumerate(((d, of_detection), (r, of_reference))):
             changed = [(partners[side] >= 0) != (now >= 0) for partners in moved]
             flipped[side] = (np.logical_or(*changed) & mask).sum()
-        hits = np.zeros(len(sets.detected), dtype=np.int64)
+        hits, skips = np.zeros((2, len(sets.detected)), dtype=np.int64)
         for place, threshold in enumerate(AP_THRESHOLDS.tolist()):
-            hits |= (candidates.match(threshold)[0] >= 0).astype(np.int64) << place
+            partner = candidates.match(threshold)[0]
+            hits |= (partner >= 0).astype(np.int64) << place
+            skips |= candidates.ignored(threshold, partner).astype(np.int64) << place
         matched = int((of_detection >= 0).sum())
         panoptic = candidates.match(0.5, above=True)[0]
         pair_iou = candidates.iou[(candidates.iou > 0.5) & (panoptic[candidates.detection] == candidates.reference)]
@@ -265,37 +274,30 @@ class IoU(CoverageEvaluator):
             ),
             panoptic=_Panoptic(pairs=len(pair_iou), sum_iou=float(pair_iou.sum())),
             left_out=sets.left_out,
-            ranking=Ranking(candidates.scores[d], hits[d]),
+            ranking=Ranking(candidates.scores[ranked], hits[ranked], skips[ranked]),
         )
         return tallies, lambda: self._verdicts(sets, candidates, of_detection, of_reference)
 
-    def _with_ignore_regions(self, sets: CountedSets) -> CountedSets:
+    def _with_ignored(self, sets: CountedSets, candidates: _Candidates, of_detection: NDArray[np.int64]) -> CountedSets:
         """Leave out detections by their IoU with left-out references, instead of by any overlap with them."""
-        pairs = overlaps_between(sets.detected, sets.reference).only_significant
-        pairs = pairs.where(~sets.references.mask[pairs.second])
-        united = sets.detected.areas[pairs.first] + sets.reference.areas[pairs.second] - pairs.area
-        ignored = np.zeros(len(sets.detected), dtype=bool)
-        ignored[pairs.first[pairs.area / united >= self.threshold]] = True
-        matched = np.zeros(len(sets.detected), dtype=bool)
-        overlaps = sets.overlaps
-        iou = overlaps.area / (
-            sets.detected.areas[overlaps.first] + sets.reference.areas[overlaps.second] - overlaps.area
-        )
-        matched[overlaps.first[iou >= self.threshold]] = True
-        code = np.where(sets.detections.code == 1, 1, np.where(ignored & ~matched, 3, 0)).astype(np.int8)
-        return CountedSets(
-            detected=sets.detected,
-            reference=sets.reference,
-            detections=Counted(code),
-            references=sets.references,
-            overlaps=overlaps.where(code[overlaps.first] == 0),
-        )
+        if self.matching == "spacenet":
+            return sets
+        ignored = candidates.ignored(self.threshold, of_detection)
+        code = np.where(sets.detections.code == 1, 1, np.where(ignored, 3, 0)).astype(np.int8)
+        return replace(sets, detections=Counted(code))
+
+    def _region_iou(self, sets: CountedSets) -> NDArray[np.float64]:
+        """Return the largest IoU of each detection with a left-out reference; 0 unless these are ignore regions."""
+        region = np.zeros(len(sets.detected))
+        if self.matching == "coco" and not sets.references.mask.all():
+            pairs = overlaps_between(sets.detected, sets.reference).only_significant
+            pairs = pairs.where(~sets.references.mask[pairs.second])
+            np.maximum.at(region, pairs.first, _iou(sets, pairs))
+        return region
 
     def _candidates(self, sets: CountedSets) -> _Candidates:
         detected, reference, overlaps = sets.detected, sets.reference, sets.overlaps
-        united = detected.areas[overlaps.first] + reference.areas[overlaps.second] - overlaps.area
-        # Rounded, so that rounding in coordinates of millions of metres decides nothing.
-        iou = np.asarray(np.round(np.minimum(overlaps.area / united, 1.0), 9), dtype=np.float64)
+        iou = _iou(sets, overlaps)
         best: NDArray[np.float64] = np.zeros(len(detected))
         np.maximum.at(best, overlaps.first, iou)
         given = detected.attributes.get(self.confidence)
@@ -303,13 +305,16 @@ class IoU(CoverageEvaluator):
         x, y = np.round(detected.centres, 3).T
         rank = np.empty(len(detected), dtype=np.int64)
         rank[np.lexsort((y, x, -best, -scores))] = np.arange(len(detected))
-        order = np.lexsort((overlaps.second, -iou, rank[overlaps.first]))
+        # Of references with equal IoU COCO takes the last one, SpaceNet the first one.
+        ties = overlaps.second if self.matching == "spacenet" else -overlaps.second
+        order = np.lexsort((ties, -iou, rank[overlaps.first]))
         return _Candidates(
             overlaps.first[order],
             overlaps.second[order],
             iou[order],
             (len(detected), len(reference)),
             scores,
+            self._region_iou(sets),
         )
 
     def _verdicts(
@@ -342,6 +347,12 @@ class IoU(CoverageEvaluator):
                 )
             )
         return coverage_verdicts(sets, self.verdict_kinds, self.measures, detections=sides[0], references=sides[1])
+
+
+def _iou(sets: CountedSets, pairs: Overlaps) -> NDArray[np.float64]:
+    """Return the IoU of some pairs, rounded, so that coordinates of millions of metres decide nothing."""
+    united = sets.detected.areas[pairs.first] + sets.reference.areas[pairs.second] - pairs.area
+    return np.asarray(np.round(np.minimum(pairs.area / united, 1.0), 9), dtype=np.float64)
 
 
 def _numbers(column: NDArray[Any]) -> NDArray[np.float64]:

@@ -8,7 +8,6 @@ import shapely
 from builders.footprint_sets import random_detections, random_reference
 from naive.evaluation import correspondence, overlap, polis
 from naive.systems import (
-    average_precision,
     band_iou,
     corners,
     covered_share,
@@ -295,47 +294,6 @@ def test_iou_agrees_with_plain_loops(seed, threshold, with_confidence):
     )  # fmt: skip
     matches = greedy(detected, reference, confidence, threshold)
     assert found.tallies.counts.true_positives == len(matches)
-    best = [max(iou(one, two) for two in reference) for one in detected]
-    ranked = best if confidence is None else confidence.tolist()
-    if len(set(ranked)) == len(ranked):
-        at_half = greedy(detected, reference, confidence, 0.5)
-        order = sorted(range(len(detected)), key=lambda d: -ranked[d])
-        expected = average_precision([d in at_half for d in order], len(reference))
-        assert found.values["ap.ap_50"] == pytest.approx(expected)
-        levels = [greedy(detected, reference, confidence, round(0.5 + 0.05 * k, 2)) for k in range(10)]
-        expected = np.mean([average_precision([d in level for d in order], len(reference)) for level in levels])
-        assert found.values["ap.ap"] == pytest.approx(expected)
-        assert found.values["ap.ar"] == pytest.approx(np.mean([len(level) for level in levels]) / len(reference))
-
-
-def test_average_precision_has_no_cap_on_the_number_of_objects():
-    houses = [house(20 * (k % 100), y=20 * (k // 100)) for k in range(10_000)]
-    found = evaluate("iou", houses, houses)
-    assert (found.values["ap.ap"], found.values["ap.ar"], found.values["iou.f1"]) == (1.0, 1.0, 1.0)
-
-
-def test_equal_confidences_count_together_so_that_their_order_changes_nothing():
-    detected, reference = sets_of(3)
-    for order in (slice(None), slice(None, None, -1)):
-        turned = rb.Footprints.of(detected[order], attributes={"confidence": np.ones(len(detected))})
-        values = rb.evaluate(turned, rb.Footprints.of(reference), evaluator="iou").values
-        assert values["ap.ap"] == pytest.approx(evaluate_with_ones(detected, reference))
-
-
-def evaluate_with_ones(detected, reference):
-    ones = rb.Footprints.of(detected, attributes={"confidence": np.ones(len(detected))})
-    return rb.evaluate(ones, rb.Footprints.of(reference), evaluator="iou").values["ap.ap"]
-
-
-def test_coco_leaves_out_a_detection_on_an_ignore_region_only_where_it_reaches_the_threshold():
-    reference = [house(0), house(50, 3, depth=3)]
-    detected = [house(0), house(50, 3, depth=3.2), house(52, 10)]
-    spacenet, coco = (
-        evaluate("iou", detected, reference, minimum_area=20.0, matching=matching) for matching in ("spacenet", "coco")
-    )
-    assert spacenet.tallies.counts.detected == 1, "whatever overlaps only a left-out reference is left out"
-    assert coco.tallies.counts.detected == 2, "the large one has an IoU below the threshold with it: a false positive"
-    assert (spacenet.values["iou.precision"], coco.values["iou.precision"]) == (1.0, 0.5)
 
 
 def test_boundary_by_hand():

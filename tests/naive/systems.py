@@ -61,18 +61,6 @@ def greedy(detected, reference, confidence, threshold):
     return matches
 
 
-def average_precision(true, references):
-    """Return AP of detections in order of falling confidence, all different: precision at 101 recalls, monotonic."""
-    points, found = [], 0
-    for number, hit in enumerate(true, start=1):
-        found += hit
-        points.append((found / references, found / number))
-    total = 0.0
-    for place in range(101):
-        total += max((precision for recall, precision in points if recall >= place / 100 - 1e-12), default=0.0)
-    return total / 101
-
-
 def outline_points(polygon):
     parts = polygon.geoms if polygon.geom_type == "MultiPolygon" else [polygon]
     return [list(ring.coords) for part in parts for ring in (part.exterior, *part.interiors)]

@@ -7,7 +7,7 @@ the tables of docs/results/evaluators.md. Stored detections are evaluated where 
 import itertools
 import sys
 
-from roofbench.benchmark.analysis import leaderboard
+from roofbench.benchmark.analysis.leaderboard import make_leaderboard
 from roofbench.benchmark.analysis.report_contents import newest_runs
 from roofbench.benchmark.execution.runner import score_stored
 from roofbench.benchmark.plan import KeyedEvaluator
@@ -18,7 +18,6 @@ from roofbench.reports.format import number_text, unit_text
 
 def boards_of(path):
     """Return the name and leaderboard of every evaluator."""
-    leaderboard._RESAMPLES = 2  # intervals are not printed, and those of AP take minutes
     with Store(path, must_exist=True) as store:
         rows = newest_runs(store)
         good = [row.id for row in rows if row.status == "ok"]
@@ -28,7 +27,7 @@ def boards_of(path):
             for run in good:
                 if run not in known:
                     score_stored(store, run, (keyed,))
-            yield name, leaderboard.make_leaderboard(rows, store, keyed, title=name)
+            yield name, make_leaderboard(rows, store, keyed, title=name)
 
 
 def row(*cells):
