@@ -1,73 +1,39 @@
-"""One window from the data to its best configuration: greedy start, annealed chain, local search.
+"""The sampler of one window: an annealed reversible jump chain and the local search of its best state.
 
-The chain starts from boxes that are placed greedily (or from nothing), is heated and cooled, and is followed by a local
-search; so is the start itself, and the better of the two is kept. The result is therefore never worse than the start.
+Runs with ``optimiser=rjmcmc`` alone. The chain starts from what the greedy search left (or from nothing), is heated and
+cooled, and its best state is improved by the local search; where that does not lower the energy of the start, the start
+is kept. The result is therefore never worse than the start.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .arrays import Floats, Mask, RandomState, Rectangles
+from .arrays import Floats, RandomState, Rectangles
 from .births import make_births
-from .local_search import local_search
-from .sampler import ChainSchedule, run_chain
+from .candidates import Boxes
+from .local_search import room_of, search
+from .moves import Move
+from .parameters import MPPParameters
+from .sampler import ChainSchedule, Trace, run_chain
 from .windows import Window, window_energy
 
-__all__ = ["Annealed", "Boxes", "Schedule", "anneal", "room_of", "search"]
+__all__ = ["Annealed", "anneal", "join_traces", "schedule_of"]
 
-#: Buildings that a window may hold besides its boxes and its present buildings.
-_ROOM = 64
-#: Boxes for which there is room, at most.
-_MOST_BOXES = 4000
-
-
-@dataclass(frozen=True, eq=False)
-class Boxes:
-    """Boxes that the data suggest (`candidates`), best first.
-
-    Attributes
-    ----------
-    rectangles : ndarray, shape (n, 5)
-    weights : ndarray, shape (n,)
-        Of the birth kernel of each box.
-    energies : ndarray, shape (n,)
-        Of each box by itself.
-    """
-
-    rectangles: Rectangles
-    weights: Floats
-    energies: Floats
-
-    def __len__(self) -> int:
-        return len(self.rectangles)
-
-    def take(self, chosen: Mask) -> Boxes:
-        """Return some of the boxes."""
-        return Boxes(self.rectangles[chosen], self.weights[chosen], self.energies[chosen])
-
-
-@dataclass(frozen=True, kw_only=True)
-class Schedule:
-    """How a window is processed.
-
-    Attributes
-    ----------
-    chain : ChainSchedule
-    data_share : float
-        Share of births from boxes.
-    greedy : bool
-        Whether the chain starts from boxes, and the start is the result where the chain does not improve it.
-    sweeps : int
-        Maximum number of local-search sweeps.
-    """
-
-    chain: ChainSchedule
-    data_share: float
-    greedy: bool
-    sweeps: int
+#: First and last temperature of the chain.
+_HOT, _COLD = 3.0, 0.1
+#: Expected buildings per km2 before the data are seen (lambda).
+_INTENSITY = 200.0
+#: Share of births and deaths among the moves; share of births that the data propose.
+_JUMP_SHARE, _DATA_BIRTHS = 0.3, 0.9
+#: Proposals at effort 1, per square metre and per box.
+_PER_AREA, _PER_BOX = 0.2, 60
+#: Rows of a trace.
+_ROWS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,50 +45,72 @@ class Annealed:
     rectangles : ndarray, shape (n, 5)
     trace : ndarray, shape (rows, columns)
         See `sampler.Trace`.
-    start, chain, final : float
-        Energy of the start, of the chain's best state, and of the result.
     """
 
     rectangles: Rectangles
     trace: Floats
-    start: float
-    chain: float
-    final: float
 
 
-def room_of(boxes: Boxes, own: Rectangles) -> int:
-    """Return how many buildings a window may hold."""
-    return _ROOM + 2 * len(own) + min(len(boxes), _MOST_BOXES)
+def schedule_of(parameters: MPPParameters, window: Window, boxes: Boxes) -> ChainSchedule:
+    """Return how a window is sampled: proposals by its area, and for each box."""
+    x0, y0, x1, y1 = window.edges.tolist()
+    cell = window.model.cell
+    area = (x1 - x0) * (y1 - y0) * cell * cell
+    proposals = max(int(parameters.effort * (_PER_AREA * area + _PER_BOX * len(boxes))), 1)
+    return ChainSchedule(
+        proposals=proposals,
+        hot=_HOT,
+        cold=_COLD,
+        intensity=_INTENSITY * 1e-6 * cell * cell,
+        jump_share=_JUMP_SHARE,
+        stride=max(proposals // _ROWS, 1),
+    )
 
 
-def search(window: Window, start: Rectangles, boxes: Boxes, *, capacity: int, sweeps: int) -> Rectangles:
-    """Return what a local search makes of a state."""
-    best: Rectangles
-    best, _ = local_search(window, start, boxes.rectangles, boxes.energies, capacity, sweeps)
-    return best
-
-
-def anneal(window: Window, boxes: Boxes, first: Rectangles, schedule: Schedule, state: RandomState) -> Annealed:
-    """Process one window.
+def anneal(parameters: MPPParameters, window: Window, boxes: Boxes, first: Rectangles, state: RandomState) -> Annealed:
+    """Sample one window.
 
     Parameters
     ----------
+    parameters : MPPParameters
     window : Window
     boxes : Boxes
         Centred in the window.
     first : ndarray, shape (k, 5)
-        Buildings to start from: what `search` made of the boxes, or none.
-    schedule : Schedule
+        Buildings to start from: what the greedy search made of the boxes, or none.
     state : ndarray of uint64
         Random stream.
     """
     capacity = room_of(boxes, first)
-    births = make_births(window, boxes.rectangles, boxes.weights, schedule.data_share)
-    chain, _, trace, chain_energy = run_chain(window, births, first, schedule.chain, capacity, state)
-    start = float(window_energy(window, first))
-    ends = [search(window, chain, boxes, capacity=capacity, sweeps=schedule.sweeps)]
-    if chain_energy >= start - 1e-9 and schedule.greedy:
-        ends.append(first)
-    finals = [float(window_energy(window, end)) for end in ends]
-    best = int(np.argmin(finals))
-    return Annealed(ends[best], trace, start, float(chain_energy), finals[best])
+    weights = np.sqrt(np.maximum(-boxes.energies, 1.0))
+    births = make_births(window, boxes.rectangles, weights, _DATA_BIRTHS)
+    schedule = schedule_of(parameters, window, boxes)
+    chain, _, trace, _ = run_chain(window, births, first, schedule, capacity, state)
+    best = search(window, chain, boxes, capacity=capacity, sweeps=parameters.sweeps)
+    worse = window_energy(window, best) >= window_energy(window, first)
+    return Annealed(first if worse and parameters.start == "greedy" else best, trace)
+
+
+def join_traces(results: Sequence[Annealed], rows: int = _ROWS) -> dict[str, Any]:
+    """Add up the traces of all squares at equal shares of their schedules.
+
+    Every square runs the same schedule on its own number of proposals, so that the temperature at a share is the same.
+    """
+    results = [result for result in results if len(result.trace)]
+    if not results:
+        return {}
+    rows = min(rows, max(len(result.trace) for result in results))
+    total = np.zeros((rows, Trace.COLUMNS))
+    for result in results:
+        trace = result.trace.copy()
+        trace[:, Trace.TRIED :] = np.cumsum(trace[:, Trace.TRIED :], axis=0)
+        total += trace[-(-np.arange(1, rows + 1) * len(trace) // rows) - 1]
+    total[1:, Trace.TRIED :] -= total[:-1, Trace.TRIED :].copy()
+    return {
+        "proposals": total[:, Trace.PROPOSALS].tolist(),
+        "temperature": (total[:, Trace.TEMPERATURE] / len(results)).tolist(),
+        "energy": total[:, Trace.ENERGY].tolist(),
+        "buildings": total[:, Trace.BUILDINGS].tolist(),
+        "tried": {move.name.lower(): total[:, Trace.TRIED + move].tolist() for move in Move},
+        "accepted": {move.name.lower(): total[:, Trace.ACCEPTED + move].tolist() for move in Move},
+    }

@@ -1,4 +1,4 @@
-"""Boxes that the data suggest: where the sampler tries births first. Each is accepted or refused by the energy.
+"""Boxes that the data suggest: where buildings are tried first. Each is accepted or refused by the energy.
 
 Nouns
 -----
@@ -16,15 +16,16 @@ box
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...core.kernels import kernel
-from .arrays import Heights, Integers, Labels, Mask, Rectangles
+from .arrays import Floats, Heights, Integers, Labels, Mask, Rectangles
 from .patches import Division, cells_of_patches, divide_patches, label_patches
 from .threads import ONE_THREAD, Threads
 
-__all__ = ["propose_boxes"]
+__all__ = ["Boxes", "propose_boxes"]
 
 #: Angles tried in a quarter turn.
 _ANGLES = 30
@@ -39,6 +40,28 @@ _ALIKE = 5e-4
 #: Fractions of a cell to which places and sides are rounded: a power of two, so that a box is the same to the last bit
 #: whatever cell of it a window of the scene begins with, and equally large boxes stay equally large.
 _FRACTIONS = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Boxes that the data suggest, best first.
+
+    Attributes
+    ----------
+    rectangles : ndarray, shape (n, 5)
+    energies : ndarray, shape (n,)
+        Of each box by itself.
+    """
+
+    rectangles: Rectangles
+    energies: Floats
+
+    def __len__(self) -> int:
+        return len(self.rectangles)
+
+    def take(self, chosen: Mask) -> Boxes:
+        """Return some of the boxes."""
+        return Boxes(self.rectangles[chosen], self.energies[chosen])
 
 
 def propose_boxes(

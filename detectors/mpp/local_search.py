@@ -13,11 +13,29 @@ import numpy as np
 from ...core.kernels import kernel
 from .absorption import absorb
 from .arrays import Floats, Rectangles
+from .candidates import Boxes
 from .energy import rectangle_energy
 from .search_moves import LEAST_GAIN, Buildings, descend, merge_best, remove, replace_by_boxes, split_best
 from .windows import Window, allowed, shared_area
 
-__all__ = ["local_search"]
+__all__ = ["local_search", "room_of", "search"]
+
+#: Buildings that a window may hold besides its boxes and its present buildings.
+_ROOM = 64
+#: Boxes for which there is room, at most.
+_MOST_BOXES = 4000
+
+
+def room_of(boxes: Boxes, own: Rectangles) -> int:
+    """Return how many buildings a window may hold."""
+    return _ROOM + 2 * len(own) + min(len(boxes), _MOST_BOXES)
+
+
+def search(window: Window, start: Rectangles, boxes: Boxes, *, capacity: int, sweeps: int) -> Rectangles:
+    """Return what a local search makes of a state."""
+    best: Rectangles
+    best, _ = local_search(window, start, boxes.rectangles, boxes.energies, capacity, sweeps)
+    return best
 
 
 @kernel

@@ -1,8 +1,9 @@
 """The detector ``mpp``: a marked point process of rectangles on a point cloud.
 
 After Yu, Li, Guan & Wang (2013), "A marked point process for automated building detection from lidar point-clouds",
-Remote Sensing Letters 4(11), 1127-1136: a valid sampler of a repaired model with roofs, texture and party walls
-(docs/results/mpp.md says what was changed and why). The algorithm as printed is the detector ``mpp-printed``.
+Remote Sensing Letters 4(11), 1127-1136: a repaired model with roofs, texture and party walls, whose energy a search
+lowers; ``optimiser=rjmcmc`` samples it (docs/results/mpp.md says what was changed and why). The algorithm as printed is
+the detector ``mpp-printed``.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..steps import Step
+from .annealing import join_traces
 from .arrays import Mask, Rectangles
 from .cells import cell_size, has_points
 from .energy import rectangle_energies
@@ -32,15 +34,15 @@ from .scores import mean_evidence
 from .squares import side_of
 from .tables import NO_TABLES
 from .threads import started_threads
-from .whole_scene import join_traces, sample_scene, total_energy
+from .whole_scene import find_rectangles, total_energy
 
 __all__ = ["MPP"]
 
 #: Parameters of earlier versions, and what to do instead.
 _REMOVED = {
-    "mode": "the printed algorithm is the detector 'mpp-printed', and 'mpp' is always the repaired sampler",
+    "mode": "the printed algorithm is the detector 'mpp-printed'; 'optimiser=rjmcmc' samples the repaired model",
     "false_alarm_ratio": "it belongs to the detector 'mpp-printed'",
-    "iterations": "it belongs to the detector 'mpp-printed'; the proposals of 'mpp' follow from effort",
+    "iterations": "it belongs to the detector 'mpp-printed'; with optimiser=rjmcmc set effort",
     "workers": "set the execution option threads",
     "tile": "the squares in which it works follow from largest_side",
     "outline": "choose the level part, building or block",
@@ -53,14 +55,17 @@ _REMOVED = {
 
 @dataclass(frozen=True, kw_only=True)
 class MPP(MPPParameters, Detector):
-    """Rectangles sampled by reversible jumps (RJMCMC) from the energy of a marked point process, without any image."""
+    """Rectangles of a marked point process, found by a search of its energy or sampled by RJMCMC, without any image."""
 
     name: ClassVar[str] = "mpp"
     paper = "after Yu, Li, Guan & Wang 2013, Remote Sensing Letters 4(11), doi:10.1080/2150704X.2013.846487"
     requires: ClassVar[tuple[str, ...]] = ("points",)
-    stochastic: ClassVar[bool] = True
     numbers: ClassVar[tuple[str, ...]] = ("part_of",)
     place_streams: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "stochastic", self.optimiser == "rjmcmc")
 
     @classmethod
     def build(cls, values: Mapping[str, Any] | None = None) -> Self:
@@ -75,11 +80,11 @@ class MPP(MPPParameters, Detector):
         return self._run(scene, rng)[0]
 
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
-        """Yield heights, evidence, boxes, convergence and result of the same run."""
+        """Yield heights, evidence, boxes, the convergence of the sampler and the result of the same run."""
         found, prepared = self._run(scene, rng)
         if prepared is None:
             return
-        yield from mpp_steps(prepared, found.polygons, found.metadata["trace"])
+        yield from mpp_steps(prepared, found.polygons, found.metadata.get("trace"))
 
     @property
     def halo(self) -> float:  # type: ignore[override]
@@ -122,22 +127,22 @@ class MPP(MPPParameters, Detector):
         with started_threads(self.threads) as threads:
             prepared = prepare(self, points, seen, threads)
             ready = time.perf_counter()
-            rectangles, results = sample_scene(self, prepared, seed, threads)
+            rectangles, results = find_rectangles(self, prepared, seed, threads)
         rectangles = rectangles[self._evident(prepared, rectangles)]
         done = time.perf_counter()
         energies = rectangle_energies(prepared.tables, rectangles, prepared.model)
         fits = fit_roofs(prepared, rectangles)
         record: dict[str, Any] = {
-            "seed": seed,
             "cell": prepared.grid.gsd,
             "background": {key: value for key, value in asdict(prepared.background).items() if key != "evidence"},
             "cues": list(prepared.cues.used),
             "notes": list(prepared.cues.notes),
             "boxes": len(prepared.boxes),
             "energy": total_energy(prepared, rectangles, energies),
-            "trace": join_traces(results),
-            "seconds": {"preparation": ready - began, "sampling": done - ready},
+            "seconds": {"preparation": ready - began, "search": done - ready},
         }
+        if self.stochastic:
+            record |= {"seed": seed, "trace": join_traces(results)}
         # Outlines are made from the cells alone: the memory of the tables is released for them.
         prepared = replace(prepared, tables=NO_TABLES)
         release_memory()

@@ -18,7 +18,7 @@ from .tables import MILLI
 __all__ = ["convergence_step", "mpp_steps"]
 
 
-def mpp_steps(prepared: Prepared, buildings: NDArray[np.object_], trace: Mapping[str, Any]) -> Iterator[Step]:
+def mpp_steps(prepared: Prepared, buildings: NDArray[np.object_], trace: Mapping[str, Any] | None) -> Iterator[Step]:
     """Yield the steps of a run.
 
     Parameters
@@ -26,9 +26,9 @@ def mpp_steps(prepared: Prepared, buildings: NDArray[np.object_], trace: Mapping
     prepared : Prepared
     buildings : ndarray of Polygon
         Outlines of the result.
-    trace : mapping
-        Columns of the chain: ``proposals``, ``energy``, ``temperature``, ``buildings`` and, by move, ``tried`` and
-        ``accepted``.
+    trace : mapping or None
+        Columns of the chain, absent from a search: ``proposals``, ``energy``, ``temperature``, ``buildings`` and, by
+        move, ``tried`` and ``accepted``.
     """
     extent = prepared.grid.extent
     metres = np.where(prepared.state == HIGH, 0.01 * prepared.height, np.nan)
@@ -50,11 +50,12 @@ def mpp_steps(prepared: Prepared, buildings: NDArray[np.object_], trace: Mapping
     yield _map(
         prepared,
         "boxes",
-        "Boxes that the data suggest as births, on shaded heights.",
+        "Boxes that the data suggest, on shaded heights.",
         relief,
         OutlineLayer(boxes, "suggested box", Role.CANDIDATE),
     )
-    yield convergence_step(trace)
+    if trace is not None:
+        yield convergence_step(trace)
     yield _map(
         prepared,
         "buildings",

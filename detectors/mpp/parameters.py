@@ -6,7 +6,9 @@ adds (docs/results/mpp.md gives the reasons and the measured effect of each).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from ...core.errors import ParameterError
 from ...core.parameters import Parameterised, execution_option, parameter
@@ -28,6 +30,11 @@ def check_sides(owner: str, least: float, largest: float) -> None:
 @dataclass(frozen=True, kw_only=True)
 class MPPParameters(Parameterised):
     """What decides the result of ``mpp``, and the number of threads, which does not."""
+
+    used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+        "start": {"optimiser": ("rjmcmc",)},
+        "effort": {"optimiser": ("rjmcmc",)},
+    }
 
     cell: float | None = parameter(
         None,
@@ -153,9 +160,21 @@ class MPPParameters(Parameterised):
         source=_OWN,
         swept=(0.05, 0.1, 0.3),
     )
-    start: str = parameter("greedy", choices=("greedy", "empty"), doc="first state of the chain", source=_OWN)
+    optimiser: str = parameter(
+        "search",
+        choices=("search", "rjmcmc"),
+        doc="search: greedy start and local search; rjmcmc: a reversible jump chain between the two as well",
+        source="Yu et al. 2013, section 2.4 (rjmcmc); roofbench (search)",
+    )
+    start: str = parameter(
+        "greedy", choices=("greedy", "empty"), doc="first state of the chain of optimiser=rjmcmc", source=_OWN
+    )
     effort: float = parameter(
-        0.25, minimum=0, doc="factor of the number of proposals of the chain", source=_OWN, swept=(0, 0.25, 1, 4)
+        0.25,
+        minimum=0,
+        doc="factor of the number of proposals of the chain of optimiser=rjmcmc",
+        source=_OWN,
+        swept=(0, 0.25, 1, 4),
     )
     sweeps: int = parameter(
         6,

@@ -1,4 +1,4 @@
-"""From the cloud to what the sampler reads: cells, classes, tables and boxes.
+"""From the cloud to what the search reads: cells, classes, tables and boxes.
 
 The tables and their inputs set the peak memory, 38 bytes per cell; arrays are released as soon as they are no longer
 needed.
@@ -18,10 +18,9 @@ from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..shared.cue_information import CueInformation
-from .annealing import Boxes
 from .arrays import Heights, Integers, Mask, Rectangles, Scores, States
 from .background import Background, estimate_background, tally_textures
-from .candidates import propose_boxes
+from .candidates import Boxes, propose_boxes
 from .cells import cell_size, make_cells
 from .energy import Model, rectangle_energies
 from .memory import release_memory
@@ -53,7 +52,7 @@ _MULTIPLE_TALLY, _SINGLE_TALLY = "textures", "textures_of_single_returns"
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What the sampler reads, and what the figures show of it.
+    """What the search reads, and what the figures show of it.
 
     Attributes
     ----------
@@ -117,14 +116,13 @@ def _division(parameters: MPPParameters, grid: Grid) -> Division:
 
 
 def _rated(rectangles: Rectangles, tables: Tables, model: Model, threads: Threads) -> Boxes:
-    """Return boxes, those of the lowest energy first, with the weights of their birth kernels."""
+    """Return boxes, those of the lowest energy first."""
     parts = threads.bands(
         lambda first, last: rectangle_energies(tables, rectangles[first:last], model), len(rectangles)
     )
     energies = np.concatenate([np.empty(0), *parts])
     order = np.argsort(energies, kind="stable")
-    rectangles, energies = rectangles[order], energies[order]
-    return Boxes(rectangles, np.sqrt(np.maximum(-energies, 1.0)), energies)
+    return Boxes(rectangles[order], energies[order])
 
 
 def _shortened(height: Heights, threads: Threads) -> NDArray[np.uint16]:

@@ -20,16 +20,8 @@ import numpy as np
 from ...core.kernels import kernel
 from .arrays import Floats, RandomState, Rectangles
 from .births import Births, birth_density, propose_birth
-from .energy import energy_below, least_energy, overlaps, rectangle_energy
-from .moves import (
-    Move,
-    birth_log_ratio,
-    draw_auxiliary,
-    merge_rectangles,
-    propose_change,
-    split_log_ratio,
-    split_rectangle,
-)
+from .energy import energy_below, rectangle_energy
+from .moves import Move, birth_log_ratio, propose_change
 from .random_stream import integer, uniform
 from .windows import Window, allowed, shared_area, window_energy
 
@@ -51,8 +43,8 @@ class Trace(IntEnum):
     ENERGY = 2
     BUILDINGS = 3
     TRIED = 4
-    ACCEPTED = 12
-    COLUMNS = 20
+    ACCEPTED = 10
+    COLUMNS = 16
 
 
 class ChainSchedule(NamedTuple):
@@ -65,10 +57,8 @@ class ChainSchedule(NamedTuple):
         First and last temperature.
     intensity : float
         Expected number of buildings per square cell under the prior.
-    jump_share, split_share : float
-        Share of births and deaths, and of splits and merges, each in equal parts, among the moves.
-    merge_reach : float
-        Distance of centres, cells, within which two buildings may merge.
+    jump_share : float
+        Share of births and deaths, in equal parts, among the moves.
     stride : int
         Proposals per row of the trace.
     """
@@ -78,8 +68,6 @@ class ChainSchedule(NamedTuple):
     cold: float
     intensity: float
     jump_share: float
-    split_share: float
-    merge_reach: float
     stride: int
 
 
@@ -91,7 +79,7 @@ class _Chain(NamedTuple):
     rectangles : ndarray, shape (capacity, 5)
     energies : ndarray, shape (capacity,)
         Of each rectangle by itself.
-    new, other : ndarray, shape (5,)
+    new : ndarray, shape (5,)
         What is proposed.
     state : ndarray of uint64
         Random stream.
@@ -100,7 +88,6 @@ class _Chain(NamedTuple):
     rectangles: Rectangles
     energies: Floats
     new: Rectangles
-    other: Rectangles
     state: RandomState
 
 
@@ -122,29 +109,6 @@ class _Odds(NamedTuple):
     density: float
     log_jump: float
     limit: float
-
-
-@kernel
-def _neighbours(rectangles: Rectangles, count: int, i: int, reach: float) -> int:
-    """Return how many others lie with their centre within reach of building i."""
-    near = 0
-    for j in range(count):
-        dx, dy = rectangles[j, 0] - rectangles[i, 0], rectangles[j, 1] - rectangles[i, 1]
-        if j != i and dx * dx + dy * dy < reach * reach:
-            near += 1
-    return near
-
-
-@kernel
-def _pick_neighbour(rectangles: Rectangles, count: int, i: int, reach: float, number: int) -> int:
-    """Return the index of the neighbour of building i with this number, in order of index."""
-    for j in range(count):
-        dx, dy = rectangles[j, 0] - rectangles[i, 0], rectangles[j, 1] - rectangles[i, 1]
-        if j != i and dx * dx + dy * dy < reach * reach:
-            if number == 0:
-                return j
-            number -= 1
-    return -1
 
 
 @kernel
@@ -185,72 +149,6 @@ def _try_death(window: Window, births: Births, chain: _Chain, count: int, odds: 
 
 
 @kernel
-def _try_split(window: Window, chain: _Chain, count: int, odds: _Odds, axis: int, reach: float) -> tuple[int, float]:
-    """Propose a split along an axis; returns what `_try_birth` does."""
-    if not 0 < count < len(chain.energies):
-        return count, 0.0
-    model, tables, rectangles, energies = window.model, window.tables, chain.rectangles, chain.energies
-    new, other = chain.new, chain.other
-    i = integer(chain.state, count)
-    side = rectangles[i, 2 + axis]
-    split_rectangle(rectangles[i], axis, draw_auxiliary(side, chain.state), new, other)
-    apart = math.hypot(new[0] - other[0], new[1] - other[1])
-    if not (allowed(window, new) and allowed(window, other) and apart < reach):
-        return count, 0.0
-    parent = rectangles[i].copy()
-    rectangles[i], rectangles[count] = new, other
-    near_first = _neighbours(rectangles, count + 1, i, reach)
-    near_second = _neighbours(rectangles, count + 1, count, reach)
-    rectangles[i] = parent
-    ratio = split_log_ratio(0.0, odds.temperature, odds.density, count, side, near_first, near_second)
-    limit = odds.limit + odds.temperature * ratio
-    pair = np.empty((1, 5))
-    pair[0] = new
-    shared = overlaps(pair, 1, other, -1, -1)
-    shared += shared_area(window, rectangles, count, new, i, -1)
-    shared += shared_area(window, rectangles, count, other, i, -1)
-    shared -= shared_area(window, rectangles, count, parent, i, -1)
-    rest = model.overlap * shared - energies[i]
-    least = least_energy(tables, other, model)
-    first = energy_below(tables, new, model, limit - rest - least)
-    second = energy_below(tables, other, model, limit - rest - first)
-    if first + second + rest >= limit:
-        return count, 0.0
-    rectangles[i], energies[i] = new, first
-    rectangles[count], energies[count] = other, second
-    return count + 1, first + second + rest
-
-
-@kernel
-def _try_merge(window: Window, chain: _Chain, count: int, odds: _Odds, axis: int, reach: float) -> tuple[int, float]:
-    """Propose a merge along an axis; returns what `_try_birth` does."""
-    if count < 2:
-        return count, 0.0
-    model, rectangles, energies, new = window.model, chain.rectangles, chain.energies, chain.new
-    i = integer(chain.state, count)
-    near_first = _neighbours(rectangles, count, i, reach)
-    if near_first == 0:
-        return count, 0.0
-    j = _pick_neighbour(rectangles, count, i, reach, integer(chain.state, near_first))
-    found, _ = merge_rectangles(rectangles[i], rectangles[j], axis, new)
-    if not (found and allowed(window, new)):
-        return count, 0.0
-    near_second = _neighbours(rectangles, count, j, reach)
-    ratio = split_log_ratio(0.0, odds.temperature, odds.density, count - 1, new[2 + axis], near_first, near_second)
-    limit = odds.limit - odds.temperature * ratio
-    shared = shared_area(window, rectangles, count, new, i, j)
-    shared -= shared_area(window, rectangles, count, rectangles[i], i, -1)
-    shared -= shared_area(window, rectangles, count, rectangles[j], i, j)
-    rest = model.overlap * shared - energies[i] - energies[j]
-    alone = energy_below(window.tables, new, model, limit - rest)
-    if alone + rest >= limit:
-        return count, 0.0
-    rectangles[i], energies[i] = new, alone
-    rectangles[j], energies[j] = rectangles[count - 1], energies[count - 1]
-    return count - 1, alone + rest
-
-
-@kernel
 def _try_change(window: Window, chain: _Chain, count: int, odds: _Odds, kind: int) -> tuple[bool, float]:
     """Propose a shift or a change of an edge, side or angle; return whether it was accepted and the energy's change."""
     if count == 0:
@@ -277,9 +175,7 @@ def _drawn_move(draw: float, schedule: ChainSchedule) -> Move:
     """Return the move that a uniform number selects."""
     if draw < schedule.jump_share:
         return Move.BIRTH if draw < 0.5 * schedule.jump_share else Move.DEATH
-    if draw < schedule.jump_share + schedule.split_share:
-        return Move.SPLIT if draw < schedule.jump_share + 0.5 * schedule.split_share else Move.MERGE
-    draw = (draw - schedule.jump_share - schedule.split_share) / (1.0 - schedule.jump_share - schedule.split_share)
+    draw = (draw - schedule.jump_share) / (1.0 - schedule.jump_share)
     if draw < _SHIFTS:
         return Move.SHIFT
     if draw < _EDGES:
@@ -308,7 +204,7 @@ def run_chain(
     model = window.model
     span = model.largest_side - model.least_side
     density = schedule.intensity / (span * span * math.pi)
-    chain = _Chain(np.empty((capacity, 5)), np.empty(capacity), np.empty(5), np.empty(5), state)
+    chain = _Chain(np.empty((capacity, 5)), np.empty(capacity), np.empty(5), state)
     count = min(len(start), capacity)
     for i in range(count):
         chain.rectangles[i] = start[i]
@@ -332,10 +228,6 @@ def run_chain(
             count, delta = _try_birth(window, births, chain, count, odds)
         elif kind == Move.DEATH:
             count, delta = _try_death(window, births, chain, count, odds)
-        elif kind == Move.SPLIT:
-            count, delta = _try_split(window, chain, count, odds, integer(state, 2), schedule.merge_reach)
-        elif kind == Move.MERGE:
-            count, delta = _try_merge(window, chain, count, odds, integer(state, 2), schedule.merge_reach)
         else:
             accepted, delta = _try_change(window, chain, count, odds, kind)
         trace[row, Trace.TRIED + kind] += 1

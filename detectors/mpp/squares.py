@@ -11,10 +11,11 @@ group
     One of four; squares of one group do not touch. The groups are processed one after the other, the squares of one
     group in parallel: their jobs see what the groups before left.
 
-Three rounds: a greedy search of the squares, group by group; a chain in each square, between what the first round left
-in its neighbours; a local search of squares shifted by half a side, group by group, which lets buildings on the borders
-move and merge. Only the second round draws random numbers, and it starts from a result of few metres' memory. So what
-is found at a place depends on little more than the squares around it: a window of a scene gives what the scene gives.
+Two rounds: a greedy search of the squares, group by group, and a local search of squares shifted by half a side, group
+by group, which lets buildings on the borders move and merge. The sampler adds a round between the two: a chain in each
+square, between what the first round left in its neighbours. It alone draws random numbers, and it starts from a result
+that depends on few metres around. So what is found at a place depends on little more than the squares around it: a
+window of a scene gives what the scene gives.
 """
 
 from __future__ import annotations
@@ -50,6 +51,11 @@ class Square(NamedTuple):
     column: int
     row: int
     edges: Floats
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Column and row as whole numbers that are not negative, for a random stream."""
+        return self.column % 2**32, self.row % 2**32
 
     @property
     def group(self) -> int:

@@ -1,9 +1,9 @@
 """Gate detectors against themselves with fresh seeds: ``python tests/performance/gate_identical.py [STORE]``.
 
-A stochastic detector (``mpp``) on the scenes of the suite ``gate``: one baseline and fifty candidates, no seed used
-twice, with one and with five chains a scene; and 2 000 random pairs of a baseline and a candidate, for the share of
-false alarms. A deterministic one (``ndsm``): fifty times ten fresh scenes, each measured twice, in one and in two
-workers.
+A stochastic detector (``mpp[optimiser=rjmcmc]``) on the scenes of the suite ``gate``: one baseline and fifty
+candidates, no seed used twice, with one and with five chains a scene; and 2 000 random pairs of a baseline and a
+candidate, for the share of false alarms. A deterministic one (``ndsm``): fifty times ten fresh scenes, each measured
+twice, in one and in two workers.
 """
 
 import sys
@@ -24,6 +24,7 @@ from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 
 CANDIDATES, PAIRS, SCENES = 50, 2000, 10
+SAMPLER = "mpp[optimiser=rjmcmc]"
 EVALUATOR = make_evaluator("threshold-free")
 INDICES = EVALUATOR.gated_indices()
 MARGINS = margins_of([], INDICES)
@@ -45,7 +46,7 @@ def verdicts(before, after):
 def stochastic(store):
     scenes = named_suite("gate").scenes
     seeds = tuple(range(5 * (CANDIDATES + 1)))
-    found = values_of(Suite("mpp", scenes, (DetectorEntry(make_detector("mpp"), seeds),), (EVALUATOR,)), store)
+    found = values_of(Suite("mpp", scenes, (DetectorEntry(make_detector(SAMPLER), seeds),), (EVALUATOR,)), store)
 
     def chains(chosen):
         return {(scene.name, seed): found[scene.name, seed] for scene in scenes for seed in chosen}
@@ -56,7 +57,7 @@ def stochastic(store):
         results = [verdicts(baseline, candidate) for candidate in candidates]
         passed = sum("worse" not in result for result in results)
         message = dict(Counter(verdict for result in results for verdict in result))
-        print(f"mpp, {count} chains a scene: {passed} of {CANDIDATES} passed; verdicts {message}")
+        print(f"{SAMPLER}, {count} chains a scene: {passed} of {CANDIDATES} passed; verdicts {message}")
         rng = np.random.default_rng(count)
         alarms = 0
         for _ in range(PAIRS):

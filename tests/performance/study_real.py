@@ -142,7 +142,7 @@ def set_to(module, name, value):
 
 @contextmanager
 def remembered():
-    """Sample each scene once for all thresholds that only outlines depend on; the ground is filtered once, too."""
+    """Search each scene once for all thresholds that only outlines depend on; the ground is filtered once, too."""
     results = {}
 
     def keep(name, function, key):
@@ -155,8 +155,8 @@ def remembered():
         return wrapped
 
     prepared = keep("prepare", mpp_detector.prepare, lambda given: (given[2].extent, len(given[1])))
-    sampled = keep("sample", mpp_detector.sample_scene, lambda given: (id(given[1]), given[2]))
-    with set_to(mpp_detector, "prepare", prepared), set_to(mpp_detector, "sample_scene", sampled):
+    searched = keep("find", mpp_detector.find_rectangles, lambda given: (id(given[1]), given[2]))
+    with set_to(mpp_detector, "prepare", prepared), set_to(mpp_detector, "find_rectangles", searched):
         yield
 
 

@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from roofbench.core.errors import ParameterError
-from roofbench.detectors.mpp import whole_scene
+from roofbench.detectors.mpp import annealing
 from roofbench.detectors.mpp.squares import rounds_of
 from roofbench.detectors.registry import make_detector
 from roofbench.scenes.geodata.points import PointCloud
@@ -68,8 +68,35 @@ def test_houses_are_found_with_party_wall_and_roof_and_trees_are_not():
     assert found.crs == "EPSG:25832"
 
 
-def test_the_record_holds_the_convergence_as_json():
-    record = detect(cloud()).metadata
+SAMPLER = "mpp[level=part,optimiser=rjmcmc]"
+
+
+def test_the_default_is_a_search_that_draws_no_random_number_and_compiles_no_chain(monkeypatch):
+    monkeypatch.setattr(annealing, "run_chain", None)
+    assert not make_detector("mpp").stochastic
+    one, two = detect(cloud(), seed=0), detect(cloud(), seed=1)
+    assert len(one) == 3
+    assert wkb(one) == wkb(two)
+    assert json.loads(json.dumps(one.metadata)) == one.metadata
+    assert not {"seed", "trace"} & one.metadata.keys()
+
+
+def test_the_sampler_is_random_and_its_seed_decides():
+    assert make_detector(SAMPLER).stochastic
+    runs = [detect(cloud(), "mpp[level=part,optimiser=rjmcmc,effort=8]", seed=seed) for seed in (0, 0, 1)]
+    assert [len(run) for run in runs] == [3, 3, 3]
+    assert wkb(runs[0]) == wkb(runs[1])
+    energies = [run.metadata["trace"]["energy"] for run in runs]
+    assert energies[0] == energies[1] != energies[2]
+
+
+def test_parameters_of_the_sampler_alone_do_not_change_the_search():
+    assert make_detector("mpp[effort=4,start=empty]") == make_detector("mpp")
+    assert make_detector("mpp[effort=4,optimiser=rjmcmc]") != make_detector("mpp[optimiser=rjmcmc]")
+
+
+def test_the_record_of_the_sampler_holds_the_convergence_as_json():
+    record = detect(cloud(), SAMPLER).metadata
     assert json.loads(json.dumps(record)) == record
     trace = record["trace"]
     assert len(trace["energy"]) == len(trace["temperature"]) == len(trace["buildings"]) == len(trace["tried"]["birth"])
@@ -80,10 +107,11 @@ def test_the_record_holds_the_convergence_as_json():
 @pytest.mark.slow
 def test_same_seed_same_bits_with_any_number_of_threads_and_squares():
     points = cloud(1)
-    small = "mpp[level=part,largest_side=30,threads={}]"
-    one = detect(points, small.format(1))
-    assert len(one) >= 3
-    assert wkb(one) == wkb(detect(points, small.format(2))) == wkb(detect(points, small.format(3)))
+    for optimiser in ("search", "rjmcmc"):
+        small = f"mpp[level=part,largest_side=30,optimiser={optimiser},threads={{}}]"
+        one = detect(points, small.format(1))
+        assert len(one) >= 3
+        assert wkb(one) == wkb(detect(points, small.format(2))) == wkb(detect(points, small.format(3)))
 
 
 def test_order_of_points_does_not_matter():
@@ -207,15 +235,16 @@ def test_every_parameter_has_a_meaning_and_a_source():
 
 
 def test_without_births_from_data_the_sampler_still_finds_the_houses(monkeypatch):
-    monkeypatch.setattr(whole_scene, "_DATA_BIRTHS", 0.0)
-    monkeypatch.setattr(whole_scene, "_HOT", 30.0)
-    found = detect(cloud(7), "mpp[start=empty,effort=30]")
+    monkeypatch.setattr(annealing, "_DATA_BIRTHS", 0.0)
+    monkeypatch.setattr(annealing, "_HOT", 30.0)
+    found = detect(cloud(7), "mpp[optimiser=rjmcmc,start=empty,effort=30]")
     truth = shapely.union_all([shapely.box(*roof[:4]) for roof in ROOFS])
     assert shapely.intersection(shapely.union_all(found.polygons), truth).area > 0.85 * truth.area
 
 
 def test_the_steps_end_with_the_buildings_of_the_same_run():
-    steps = list(make_detector("mpp[level=part]").steps(scene(cloud()), np.random.default_rng(0)))
-    assert [step.name for step in steps] == ["heights", "evidence", "boxes", "convergence", "buildings"]
-    buildings = steps[-1].panels[0].layers[-1].polygons
-    assert wkb(detect(cloud())) == sorted(shapely.to_wkb(buildings).tolist())
+    for selection, more in (("mpp[level=part]", []), (SAMPLER, ["convergence"])):
+        steps = list(make_detector(selection).steps(scene(cloud()), np.random.default_rng(0)))
+        assert [step.name for step in steps] == ["heights", "evidence", "boxes", *more, "buildings"]
+        buildings = steps[-1].panels[0].layers[-1].polygons
+        assert wkb(detect(cloud(), selection)) == sorted(shapely.to_wkb(buildings).tolist())

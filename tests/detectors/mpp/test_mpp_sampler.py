@@ -10,18 +10,8 @@ from scipy import stats
 from roofbench.detectors.mpp.births import birth_density, make_births, propose_birth
 from roofbench.detectors.mpp.energy import Model, configuration_energy, rectangle_energies
 from roofbench.detectors.mpp.local_search import local_search
-from roofbench.detectors.mpp.moves import (
-    GAP,
-    OFFSET,
-    SKEW,
-    Auxiliary,
-    Move,
-    birth_log_ratio,
-    merge_rectangles,
-    split_rectangle,
-)
+from roofbench.detectors.mpp.moves import Move, birth_log_ratio
 from roofbench.detectors.mpp.random_stream import gaussian, stream, uniform
-from roofbench.detectors.mpp.rectangles import corners
 from roofbench.detectors.mpp.sampler import ChainSchedule, Trace, run_chain
 from roofbench.detectors.mpp.tables import NO_TABLES, make_tables
 from roofbench.detectors.mpp.windows import Window, window_energy
@@ -76,8 +66,6 @@ def chain(tables, births, proposals, seed=0, start=NONE, energy=None, **changes)
         "cold": 1.0,
         "intensity": 3 / 1600,
         "jump_share": 0.4,
-        "split_share": 0.2,
-        "merge_reach": 20.0,
         "stride": 50,
     }
     return run_chain(window(tables, energy), births, start, ChainSchedule(**{**values, **changes}), 200, stream([seed]))
@@ -142,39 +130,6 @@ def test_births_are_drawn_with_the_density_that_deaths_use():
     # Draws of the kernels alone fall where their density is.
     near = np.abs(BOXES[0] + np.array([0.5, 0.5, 0, 0, 0.01]))
     assert birth_density(births, near) > 100 * birth_density(births, np.array([35.0, 5, 5, 5, 1.0]))
-
-
-def test_merge_undoes_split():
-    rng = np.random.default_rng(1)
-    first, second, parent = np.empty(5), np.empty(5), np.empty(5)
-    for _ in range(300):
-        axis = int(rng.integers(2))
-        whole = np.array([20, 20, rng.uniform(10, 20), rng.uniform(10, 20), rng.uniform(0, math.pi)])
-        numbers = Auxiliary(rng.uniform(-3, 3), *(rng.uniform(-1, 1, 4) * (GAP, OFFSET / 2, OFFSET / 2, SKEW)))
-        split_rectangle(whole, axis, numbers, first, second)
-        for pair in ((first, second), (second, first)):
-            found, auxiliary = merge_rectangles(*pair, axis, parent)
-            assert found
-            np.testing.assert_allclose(
-                np.sort(corners(parent)[0], axis=0), np.sort(corners(whole)[0], axis=0), atol=1e-9
-            )
-            # An angle that passes pi turns the frame round, which exchanges the lower and upper edges.
-            np.testing.assert_allclose(np.sort(np.abs(auxiliary)), np.sort(np.abs(numbers)), atol=1e-9)
-
-
-def test_the_map_of_a_split_has_jacobian_eight():
-    rng = np.random.default_rng(2)
-
-    def image(point, axis):
-        first, second = np.empty(5), np.empty(5)
-        split_rectangle(point[:5], axis, Auxiliary(*point[5:]), first, second)
-        return np.concatenate([first, second])
-
-    for axis in (0, 1):
-        point = np.array([20, 18, 14, 11, 1.1, *rng.uniform(-0.05, 0.05, 5)])
-        step = 1e-6
-        columns = [(image(point + step * e, axis) - image(point - step * e, axis)) / (2 * step) for e in np.eye(10)]
-        assert abs(np.linalg.det(np.array(columns))) == pytest.approx(8.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("births", [births_of(), births_of(BOXES, 0.5)])
