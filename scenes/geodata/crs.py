@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,9 @@ __all__ = [
     "crs_label",
     "crs_text",
     "file_crs",
+    "height_unit",
+    "is_geographic",
+    "misfit",
     "named_crs",
     "parse_crs",
     "require_metric",
@@ -134,6 +138,28 @@ def _horizontal(text: str) -> CRS:
     return crs
 
 
+def is_geographic(text: str | None) -> bool:
+    """Return whether coordinates in a CRS are degrees; False where none is known."""
+    return text is not None and _horizontal(text).is_geographic
+
+
+def misfit(text: str, bounds: Sequence[float]) -> str | None:
+    """Return why coordinates cannot be in a CRS, as words that follow its name; None when they can.
+
+    A record of heights alone, or of degrees beside metres, is wrong and says nothing of the place.
+
+    Parameters
+    ----------
+    text : str
+    bounds : sequence of float
+        Values of the coordinates, in any order.
+    """
+    crs = _horizontal(text)
+    if crs.is_geographic:
+        return "is geographic (degrees), which its coordinates cannot be" if max(map(abs, bounds)) > 360 else None
+    return None if crs.is_geocentric else _unusable(text)
+
+
 @lru_cache(maxsize=64)
 def _unusable(text: str) -> str | None:
     """Return why coordinates of a system are neither degrees nor on a map; None when they are."""
@@ -189,17 +215,25 @@ def require_metric(text: str | None, where: str, *, heights: bool = True, remedy
         )
     unit = crs.axis_info[0] if crs.axis_info else None
     if unit is not None and abs(unit.unit_conversion_factor - 1.0) > 1e-9:
-        raise CRSError(f"{where}: {crs_label(text)} is in {unit.unit_name}, metres are needed: {remedy or _REPROJECT}")
-    if not heights:
-        return
-    whole = parse_crs(text)
-    for part in whole.sub_crs_list if whole.is_compound else [whole]:
-        for axis in part.axis_info:
-            if axis.direction in ("up", "down") and abs(axis.unit_conversion_factor - 1.0) > 1e-9:
-                raise CRSError(
-                    f"{where}: its heights are in {axis.unit_name} ({part.name}), metres are needed: "
-                    f"{remedy or 'convert them'}"
-                )
+        name = str(unit.unit_name)
+        if name.lower().startswith("met"):
+            name = f"a {name} of {unit.unit_conversion_factor:.7g} m"
+        raise CRSError(f"{where}: {crs_label(text)} is in {name}, metres are needed: {remedy or _REPROJECT}")
+    found = height_unit(parse_crs(text)) if heights else None
+    if found is not None:
+        raise CRSError(f"{where}: its heights are in {found}, metres are needed: {remedy or 'convert them'}")
+
+
+def height_unit(crs: CRS) -> str | None:
+    """Return the unit of the heights of a CRS with the name of their system; None for metres or without heights."""
+    if crs.is_bound:
+        return None if crs.source_crs is None else height_unit(crs.source_crs)
+    if crs.is_compound:
+        return next(filter(None, map(height_unit, crs.sub_crs_list)), None)
+    for axis in crs.axis_info:
+        if axis.direction in ("up", "down") and abs(axis.unit_conversion_factor - 1.0) > 1e-9:
+            return f"{axis.unit_name} ({crs.name})"
+    return None
 
 
 def scale_warning(text: str | None, x: float, y: float) -> str | None:

@@ -20,6 +20,7 @@ from ...core.errors import InputError, UnsupportedError
 from ...core.inputs import require_file
 from ...core.plain_paths import plain_path
 from .crs import file_crs, named_crs, require_metric
+from .degrees import refuse_degrees
 from .footprints import Footprints
 from .ogr_layers import quiet
 from .outline_batch import OutlineBatch
@@ -28,8 +29,8 @@ from .wkb import geometries_of_wkb
 
 __all__ = ["FootprintStream", "open_stream", "wkb_buffers"]
 
-#: Features of a batch.
-_BATCH = 1 << 17
+#: Features of a batch, and those that are looked at before the first.
+_BATCH, _SAMPLE = 1 << 17, 1000
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,12 @@ def open_stream(
     if count:
         require_metric(known, str(file), heights=False)
     names = [name for name in schema.names if name != geometry]
-    return FootprintStream(file, layer, known, count, schema, geometry, building_column(file, names, building_id))
+    stream = FootprintStream(file, layer, known, count, schema, geometry, building_column(file, names, building_id))
+    for batch in stream.batches([]):
+        first = stream.wkb(batch).slice(0, _SAMPLE).to_numpy(zero_copy_only=False)
+        refuse_degrees(geometries_of_wkb(first, file)[0], str(file))
+        break
+    return stream
 
 
 def _arrow() -> Any:

@@ -7,20 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import CRSError, InputError
-from .crs import file_crs, require_metric
+from .crs import crs_label, file_crs, misfit, require_metric
+from .geo_keys import foreign_units, is_user_defined, user_defined_crs
 
 __all__ = ["HEADER_BYTES", "header_crs", "refuse_cut_off", "refuse_pointwise", "refuse_record_counts"]
 
 #: Length of the longest header (LAS 1.4), bytes.
 HEADER_BYTES = 375
-#: GeoTIFF codes of linear units that are not metres, in the GeoKeys of LAS up to 1.3.
-_FEET = {9002: "feet", 9003: "US survey feet", 9005: "Clarke's feet"}
 #: Compressor in the record of LASzip: one stream of points, without chunks.
 _POINTWISE = b"\x01\x00"
 #: How point files get another CRS.
 _REPROJECT = "reproject it, for instance with pdal's filters.reprojection, or correct its record if that is wrong"
-#: GeoKeys of the horizontal unit, the vertical unit and the vertical CRS.
-_HORIZONTAL_UNIT_KEY, _VERTICAL_UNIT_KEY, _VERTICAL_CRS_KEY = 3076, 4099, 4096
 
 
 def refuse_record_counts(file: Path, head: bytes) -> None:
@@ -63,48 +60,42 @@ def refuse_cut_off(file: Path, header: Any) -> None:
 def header_crs(file: Path, header: Any, fallback: str | None) -> str | None:
     """Return the horizontal CRS of a header after checking its units; None when there is no record.
 
-    Where the record cannot be read, the fallback is returned.
+    Where the record cannot be read, or is of another kind than the coordinates, the fallback is returned.
     """
     from pyproj.exceptions import CRSError as ProjError
 
-    _refuse_feet(file, header)
+    keys = _keys(header)
+    foreign = foreign_units(keys)
+    if foreign is not None:
+        what, unit = foreign
+        raise CRSError(f"{file}: its {what} are in {unit}, metres are needed: {_REPROJECT}")
     try:
-        crs = header.parse_crs()
+        if is_user_defined(keys):
+            crs = user_defined_crs(header.vlrs)
+            reason = "user-defined, and described incompletely"
+        else:
+            crs, reason = header.parse_crs(), None
     except ProjError as error:
+        crs, reason = None, str(error)
+    if crs is None and reason is None:
+        return None
+    if crs is None:
         if fallback is not None:
             return fallback
-        raise CRSError(f"{file}: its CRS record cannot be read ({error}): name the CRS by crs=") from error
-    if crs is None:
-        return None
+        raise CRSError(f"{file}: its CRS record cannot be read ({reason}): name the CRS by crs=")
     text = file_crs(crs)
+    wrong = None if text is None else misfit(text, [*header.mins[:2], *header.maxs[:2]])
+    if wrong is not None:
+        if fallback is not None:
+            return fallback
+        raise CRSError(f"{file}: {crs_label(text)} {wrong}: name the true CRS by crs=")
     if text is not None:
         require_metric(crs.to_wkt(), str(file), remedy=_REPROJECT)
     return text
 
 
-def _refuse_feet(file: Path, header: Any) -> None:
-    """Refuse GeoKeys that name feet, by a unit or by a vertical CRS: the horizontal code does not define heights."""
+def _keys(header: Any) -> list[Any]:
+    """Return the GeoKeys of a header that has no WKT."""
     if any(record.string.strip("\0 ") for record in header.vlrs.get("WktCoordinateSystemVlr")):
-        return
-    for record in header.vlrs.get("GeoKeyDirectoryVlr"):
-        for key in record.geo_keys:
-            unit = _FEET.get(key.value_offset) if key.tiff_tag_location == 0 else None
-            if unit and key.id in (_HORIZONTAL_UNIT_KEY, _VERTICAL_UNIT_KEY):
-                what = "coordinates" if key.id == _HORIZONTAL_UNIT_KEY else "heights"
-                raise CRSError(f"{file}: its {what} are in {unit}, metres are needed: {_REPROJECT}")
-            if key.id == _VERTICAL_CRS_KEY and key.tiff_tag_location == 0:
-                vertical = _vertical_unit(key.value_offset)
-                if vertical is not None:
-                    raise CRSError(f"{file}: its heights are in {vertical}, metres are needed: {_REPROJECT}")
-
-
-def _vertical_unit(code: int) -> str | None:
-    """Return the unit of a registered vertical CRS; None for metres and for codes that are not registered."""
-    import pyproj
-    from pyproj.exceptions import CRSError as ProjError
-
-    try:
-        axis = pyproj.CRS.from_epsg(code).axis_info[-1]
-    except (ProjError, IndexError):
-        return None
-    return None if abs(axis.unit_conversion_factor - 1.0) < 1e-9 else str(axis.unit_name)
+        return []
+    return [key for record in header.vlrs.get("GeoKeyDirectoryVlr") for key in record.geo_keys]

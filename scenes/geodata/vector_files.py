@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,7 +21,8 @@ from ...core.inputs import require_file
 from ...core.output import whole_file
 from ...core.plain_paths import plain_path, plain_target
 from ...core.registry import nearest_hint
-from .crs import common_crs, crs_label, file_crs, named_crs, parse_crs, require_metric, same_crs
+from .crs import common_crs, crs_label, file_crs, is_geographic, named_crs, parse_crs, require_metric, same_crs
+from .degrees import JSON_SYSTEMS, json_means_degrees, refuse_degrees
 from .footprints import Footprints
 from .label_images import ENDINGS, read_labels
 from .layer_styles import add_layer_styles
@@ -44,11 +44,6 @@ __all__ = [
     "write_footprints",
     "write_layers",
 ]
-#: Endings of GeoJSON, whole or a feature per line; without a CRS it is in degrees (RFC 7946).
-_JSON_ENDINGS = (".geojson", ".json", ".geojsonl", ".geojsons", ".ndjson", ".jsonl")
-#: What GDAL takes a GeoJSON file to be in that names no CRS: without and with heights.
-_JSON_SYSTEMS = ("EPSG:4326", "EPSG:4979")
-
 #: Geometry type of shapely to that of OGR.
 _KINDS = {1: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon", 0: "Point", 4: "MultiPoint"}
 #: File ending to GDAL driver; GeoParquet is read and written by geopandas (extra ``parquet``).
@@ -107,7 +102,7 @@ def read_footprints(
     InputError
         Missing or unreadable file, unknown layer or column, no polygons.
     CRSError
-        Geographic CRS or one that is not in metres.
+        Geographic CRS, one that is not in metres, or coordinates that can only be degrees.
     """
     file, named = split_layer(path)
     layer = layer or named
@@ -120,9 +115,11 @@ def read_footprints(
         geometries, columns, own_crs, closed = read_parquet(file)
     else:
         geometries, columns, own_crs, closed = _read_ogr(file, layer)
-    if crs is None and own_crs in _JSON_SYSTEMS and not _means_degrees(file, geometries):
+    if crs is None and own_crs in JSON_SYSTEMS and not json_means_degrees(file, geometries):
         own_crs = None
     crs = crs or own_crs
+    if not is_geographic(crs):
+        refuse_degrees(geometries, str(file))
     if to_crs is not None:
         geometries, crs = _transformed(file, geometries, crs or to_crs, to_crs), to_crs
     if len(geometries):
@@ -359,24 +356,6 @@ def building_column(file: Path, columns: Iterable[str], name: str | None) -> str
             f"{file} has no column {name!r}{nearest_hint(name, known)}; it has {', '.join(known) or 'none'}"
         )
     return name
-
-
-def _means_degrees(file: Path, geometries: NDArray[np.object_]) -> bool:
-    """Return False for a GeoJSON that is taken as WGS 84 (RFC 7946) though it is empty, says null, or cannot be."""
-    if file.suffix.lower() not in _JSON_ENDINGS:
-        return True
-    if not len(geometries):
-        return False
-    with file.open(encoding="utf-8", errors="replace") as stream:
-        if re.search(r'"crs"\s*:\s*null', stream.read(4096)):
-            return False
-    bounds = np.abs(shapely.total_bounds(geometries))
-    if max(bounds[0], bounds[2]) <= 90 < max(bounds[1], bounds[3]) <= 180:
-        raise CRSError(
-            f"{file}: its coordinates look like degrees with latitude first, GeoJSON has longitude first: swap the "
-            "axes, and reproject to metres, for instance with ogr2ogr -t_srs"
-        )
-    return not (max(bounds[0], bounds[2]) > 360 or max(bounds[1], bounds[3]) > 90)
 
 
 def _transformed(file: Path, geometries: NDArray[np.object_], crs: str, to_crs: str) -> NDArray[np.object_]:

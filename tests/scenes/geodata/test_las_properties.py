@@ -130,3 +130,55 @@ def test_a_stream_compressed_point_by_point_is_refused_before_it_is_read(tmp_pat
 def test_points_in_geocentric_coordinates_are_refused(tmp_path, crs):
     with pytest.raises(CRSError, match="geocentric"):
         read_las_header(write(tmp_path / "a.las", wkt=pyproj.CRS(crs).to_wkt()))
+
+
+def with_keys(path, keys, numbers=()):
+    """Write points with GeoKeys of (id, place of the value, count, value) and numbers for those that need them."""
+    directory = struct.pack("<4H", 1, 1, 0, len(keys)) + b"".join(struct.pack("<4H", *key) for key in keys)
+    header = laspy.LasHeader(version="1.2", point_format=1)
+    header.scales, header.offsets = np.full(3, 0.001), np.array([WEST, SOUTH, 0.0])
+    header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", directory))
+    header.vlrs.append(laspy.VLR("LASF_Projection", 34736, "", struct.pack(f"<{len(numbers)}d", *numbers)))
+    data = laspy.LasData(header)
+    data.x, data.y, data.z = WEST + np.arange(3.0), SOUTH + np.arange(3.0), np.full(3, 100.0)
+    data.write(path)
+    return path
+
+
+#: UTM zone 32 north on ETRS89, described by its parameters.
+_DESCRIBED = [(1024, 0, 1, 1), (2048, 0, 1, 4258), (3072, 0, 1, 32767), (3075, 0, 1, 1), (3076, 0, 1, 9001)]
+_DESCRIBED += [(key, 34736, 1, place) for place, key in enumerate((3080, 3081, 3082, 3083, 3092))]
+_ZONE_32 = (9.0, 0.0, 500_000.0, 0.0, 0.9996)
+
+
+def test_a_user_defined_system_is_read_from_its_parameters(tmp_path):
+    for number, keys in enumerate([_DESCRIBED, [(0, 0, 0, 0), *_DESCRIBED]]):
+        assert read_las_header(with_keys(tmp_path / f"{number}.las", keys, _ZONE_32)).crs == "EPSG:25832"
+    zone_in_feet = [key if key[0] != 3076 else (3076, 0, 1, 9003) for key in _DESCRIBED]
+    with pytest.raises(CRSError, match="coordinates are in US survey foot"):
+        read_las_header(with_keys(tmp_path / "feet.las", zone_in_feet, _ZONE_32), fallback="EPSG:25832")
+
+
+@pytest.mark.parametrize(
+    ("key", "code", "unit"), [(3076, 9036, "kilometre"), (4099, 9096, "yard"), (4099, 9002, "foot")]
+)
+def test_any_registered_unit_of_length_but_the_metre_is_refused(tmp_path, key, code, unit):
+    keys = [(1024, 0, 1, 1), (3072, 0, 1, 25832), (key, 0, 1, code)]
+    with pytest.raises(CRSError, match=f"are in {unit}, metres are needed"):
+        read_las_header(with_keys(tmp_path / "a.las", keys))
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        [(1024, 0, 1, 1), (2048, 0, 1, 4258), (3072, 0, 1, 32767)],
+        [(1024, 0, 1, 2), (2048, 0, 1, 4258)],
+        [(1024, 0, 1, 1), (3072, 0, 1, 5703)],
+    ],
+    ids=["user-defined without parameters", "degrees", "heights"],
+)
+def test_a_record_that_cannot_be_of_the_coordinates_is_replaced_by_the_crs_that_is_given(tmp_path, keys):
+    file = with_keys(tmp_path / "a.las", keys)
+    with pytest.raises(CRSError, match=r"name the (true )?CRS by crs="):
+        read_las_header(file)
+    assert read_las_header(file, fallback="EPSG:25832").crs == "EPSG:25832"

@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from roofbench.core.errors import CRSError, InputError
+from roofbench.scenes.geodata.footprint_stream import open_stream
 from roofbench.scenes.geodata.footprints import Footprints
 from roofbench.scenes.geodata.vector_files import read_footprints, write_footprints
 
@@ -99,3 +100,42 @@ def test_a_ring_of_geoparquet_that_is_not_closed_is_closed_and_reported(tmp_path
         else:
             with pytest.raises(InputError, match="the geometry of feature 1 is damaged"):
                 read_footprints(file)
+
+
+def in_degrees(count=5, west=8.4, south=49.0):
+    """Return squares of 1e-4 degrees, as houses are."""
+    return [shapely.box(west + i * 2e-4, south, west + i * 2e-4 + 1e-4, south + 1e-4) for i in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("written", "crs", "message"),
+    [
+        ({}, "EPSG:25832", "are degrees and no metres"),
+        ({"crs": None}, None, "is geographic"),
+        ({"meta": {"crs": None}}, None, "is geographic"),
+        ({"crs": {"type": "name", "properties": {"name": "EPSG:25832"}}}, None, "are degrees and no metres"),
+    ],
+    ids=["metres given", "none", "none of another member", "metres named"],
+)
+@pytest.mark.parametrize("stray", [(), (shapely.box(5e5, 5.5e6, 5.1e5, 5.51e6),)], ids=["", "one in metres"])
+def test_degrees_are_never_scored_as_metres(tmp_path, written, crs, message, stray):
+    features = collection([*in_degrees(), *stray])["features"]
+    file = tmp_path / "a.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features, **written}))
+    with pytest.raises(CRSError, match=message):
+        read_footprints(file, crs=crs)
+
+
+def test_a_member_that_says_no_crs_counts_wherever_it_stands(tmp_path):
+    features = collection([shapely.box(0, 0, 10, 10)])["features"]
+    file = tmp_path / "a.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "pad": "x" * 9000, "features": features, "crs": None}))
+    assert read_footprints(file).crs is None
+
+
+def test_degrees_in_other_formats_are_refused(tmp_path):
+    write_footprints(Footprints.of(in_degrees(), crs="EPSG:25832"), tmp_path / "a.gpkg")
+    with pytest.raises(CRSError, match="are degrees and no metres"):
+        read_footprints(tmp_path / "a.gpkg")
+    with pytest.raises(CRSError, match="are degrees and no metres"):
+        open_stream(tmp_path / "a.gpkg")

@@ -441,7 +441,7 @@ def test_heights_in_feet(files, refused, vertical):
 @pytest.mark.parametrize(("key", "what"), [(4099, "heights"), (3076, "coordinates")])
 def test_feet_in_the_keys_of_old_files(files, refused, key, what):
     las(files / "old.las", crs=CRS, version="1.2", point_format=1, keys=[(key, 9003)])
-    assert f"old.las: its {what} are in US survey feet, metres are needed" in refused("old.las")
+    assert f"old.las: its {what} are in US survey foot, metres are needed" in refused("old.las")
 
 
 def test_an_unknown_crs(refused):
