@@ -41,6 +41,7 @@ __all__ = [
     "length_inside",
     "lengths",
     "prefix_sums",
+    "rescaled",
     "row_range",
     "sum_in_box",
     "to_box",
@@ -85,6 +86,14 @@ def box_corners(boxes: Boxes) -> NDArray[np.float64]:
 def box_centres(boxes: Boxes) -> NDArray[np.float64]:
     """Return the centres (x, y), pixels, shape (n, 2)."""
     return _at(boxes, (boxes[:, U0] + boxes[:, U1]) / 2, (boxes[:, V0] + boxes[:, V1]) / 2)
+
+
+def rescaled(boxes: Boxes, pixels: int) -> Boxes:
+    """Return boxes in the coordinates of a raster whose cells are `pixels` pixels wide."""
+    scaled = boxes.copy()
+    for column in (OX, OY, *range(U0, boxes.shape[1])):
+        scaled[:, column] /= pixels
+    return scaled
 
 
 @kernel

@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.parameters import parameter
-from ...scenes.geodata.raster import Image
+from ...scenes.geodata.points import PointCloud
+from ...scenes.geodata.raster import Grid, Image
 from .adjustment import adjust_to_neighbours, adjust_to_shape
+from .box_roughness import Roughness, mean_roughness, roughness_sums
 from .boxes import Boxes, lengths, prefix_sums, widths
 from .entropy import coarse_entropy, grey_levels
 from .entropy_scale import EntropyScale, entropy_scale
@@ -89,7 +91,7 @@ class Improved(LineDetector):
         "majority": {"voting": (True,)},
         "edge_blur": {"voting": (True,), "texture": ("tests",)},
         "edge_contrast": {"voting": (True,), "texture": ("tests",)},
-        "texture_margin": {"texture": ("orientation", "tests")},
+        "texture_margin": {"texture": ("score", "tests")},
         "most_edges": {"texture": ("tests",)},
         "area_per_edge": {"texture": ("tests",)},
         "peaks": {"texture": ("tests",)},
@@ -145,9 +147,10 @@ class Improved(LineDetector):
         0.5, minimum=0, maximum=1, doc="mean vote above which a line is kept", source="2011, 3.3"
     )
     texture: str = parameter(
-        "orientation", choices=("orientation", "tests", "none"),
-        doc="how candidates are tested: by the directions of the brightness gradient, entropy and vegetation; by the "
-        "six printed tests of edge orientation histograms; not at all, which the print allows",
+        "score", choices=("score", "tests", "none"),
+        doc="how candidates are tested: by a score of the directions of the brightness gradient, entropy, vegetation "
+        "and roughness of the laser points; by the six printed tests of edge orientation histograms; not at all, which "
+        "the print allows",
         source="2011, 3.4; reading",
     )  # fmt: skip
     edge_blur: float = parameter(
@@ -191,7 +194,7 @@ class Improved(LineDetector):
         largest = _ENTROPY_PIXEL if self.entropy == "relative" else gsd
         entropy = coarse_entropy(grey, gsd, largest=largest)
         scale, limit = None, 255.0 * self.entropy_threshold
-        if self.entropy == "relative" or self.texture == "orientation":
+        if self.entropy == "relative" or self.texture == "score":
             scale = entropy_scale(entropy, vegetation, masks.primary, threshold=self._index_limit(image), gsd=gsd)
             limit = scale.absolute(self.entropy_threshold) if self.entropy == "relative" else limit
         if self.entropy == "share" and entropy.size:
@@ -200,6 +203,13 @@ class Improved(LineDetector):
             limit = self.entropy_threshold
         prefix: NDArray[np.int32] = prefix_sums(entropy)
         return prefix, limit, scale
+
+    def _roughness(
+        self, points: PointCloud, heights: NDArray[np.float64], grid: Grid, spacing: float
+    ) -> Roughness | None:
+        if self.texture != "score":
+            return None
+        return roughness_sums(points, heights, grid, spacing=spacing, threshold=self.height)
 
     def _same_kind(self) -> bool:
         return self.green_extension == "same"
@@ -263,7 +273,7 @@ class Improved(LineDetector):
 
     def _texture(self, candidates: Boxes, edges: ImageEdges | None, rasters: Rasters) -> Texture | Oriented | None:
         grid = rasters.image.grid
-        if self.texture == "orientation":
+        if self.texture == "score":
             return self._oriented(candidates, rasters)
         if self.texture == "none":
             return None
@@ -279,13 +289,15 @@ class Improved(LineDetector):
         return texture_of(candidates, edges, grid, rules)
 
     def _oriented(self, candidates: Boxes, rasters: Rasters) -> Oriented:
-        """Return the alignment, entropy and vegetation of candidates, and their scores."""
+        """Return the measures of candidates, and their scores."""
         assert rasters.scale is not None
-        gradients = gradient_sums(grey_levels(rasters.image), rasters.gsd)
+        assert rasters.roughness is not None
+        gradients = gradient_sums(grey_levels(rasters.image), rasters.gsd, own_pixel=rasters.own_pixel)
         around = widened(candidates, self.texture_margin / rasters.gsd)
         return score_candidates(
             directions(gradients, around),
             rasters.scale.scaled(mean_in_boxes(rasters.cover.entropy, candidates)),
             mean_in_boxes(rasters.cover.vegetation, candidates) / self._index_limit(rasters.image),
+            mean_roughness(rasters.roughness, candidates),
             lengths(candidates) * widths(candidates) * rasters.gsd**2,
         )

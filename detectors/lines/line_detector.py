@@ -17,6 +17,7 @@ from ...scenes.geodata.raster import Grid, Image
 from ...scenes.scene import Scene
 from ..steps import Step
 from .adjustment import by_length, rotate
+from .box_roughness import Roughness
 from .boxes import UX, UY, Boxes, box_corners, lengths, prefix_sums, widths
 from .colours import Colours
 from .contours import trace_shapes
@@ -183,7 +184,8 @@ class LineDetector(LineParameters):
         if self.colour_smoothing > 0:
             rgb = np.stack([cv2.GaussianBlur(band, (3, 3), self.colour_smoothing) for band in rgb])
         colours = Colours(rgb, float(np.iinfo(rgb.dtype).max), self.colour_bins == "tenths")
-        return Rasters(image, masks, cover, colours, spacing, limit, scale)
+        rough = self._roughness(points, points.z - ground, grid, spacing)
+        return Rasters(image, masks, cover, colours, spacing, limit, scale, own_pixel, rough)
 
     def _masks(self, points: PointCloud, thresholds: NDArray[np.float64], grid: Grid, spacing: float) -> Masks:
         clip = self.border == "drop"
@@ -202,6 +204,12 @@ class LineDetector(LineParameters):
     ) -> tuple[NDArray[np.int32], float, EntropyScale | None]:
         """Return the row prefix sums of the entropy, the mean above which green areas are trees, and its scale."""
         return _NO_ENTROPY, 0.0, None
+
+    def _roughness(
+        self, points: PointCloud, heights: NDArray[np.float64], grid: Grid, spacing: float
+    ) -> Roughness | None:
+        """Return the roughness of the points, whose heights are above ground; none where it is not used."""
+        return None
 
     def _growth(self, rasters: Rasters) -> Growth:
         stop = 0.8 * rasters.spacing if self.extension_stop is None else self.extension_stop

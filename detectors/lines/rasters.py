@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from ...scenes.geodata.raster import Grid, Image
+from .box_roughness import Roughness
 from .colours import Colours
 from .entropy_scale import EntropyScale
 from .extension import Cover
@@ -33,6 +34,10 @@ class Rasters:
         Mean of the entropy raster above which a green area is a tree.
     scale : EntropyScale, optional
         Scale of the image's entropy; none where it is not used.
+    own_pixel : float
+        Pixel of the image as it was given, metres: that of `image` may be finer.
+    roughness : Roughness, optional
+        Of the laser points; none where it is not used.
     """
 
     image: Image
@@ -42,6 +47,8 @@ class Rasters:
     spacing: float
     entropy_limit: float = 0.0
     scale: EntropyScale | None = None
+    own_pixel: float = 0.0
+    roughness: Roughness | None = None
 
     @property
     def gsd(self) -> float:
