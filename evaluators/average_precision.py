@@ -169,6 +169,12 @@ class Ranking:
         return bool(self.skips.any())
 
     @cached_property
+    def counted(self) -> NDArray[np.int64]:
+        """Number of detections that count at each threshold."""
+        every = range(len(AP_THRESHOLDS))
+        return np.array([self._counts(place)[-1] if len(self.scores) else 0 for place in every], dtype=np.int64)
+
+    @cached_property
     def found(self) -> NDArray[np.int64]:
         """Number of true positives at each threshold."""
         return np.array(
@@ -195,14 +201,12 @@ class Ranking:
 
     def average_precision(self, place: int, references: int) -> float | None:
         """Return the mean precision at 101 recall points, at the threshold of that place; None without references."""
-        if not references:
-            return None
-        found, precision = self._envelopes[place]
-        points = np.searchsorted(found / references, _RECALLS, side="left")
-        return float(np.append(precision, 0.0)[points].mean())
+        return float(self.curve(place, references)[1].mean()) if references else None
 
     def curve(self, place: int, references: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the 101 recall points and the precision at each, at the threshold of that place."""
+        """Return the 101 recall points and the precision at each, NaN without references."""
+        if not references:
+            return _RECALLS, np.full(len(_RECALLS), np.nan)
         found, precision = self._envelopes[place]
-        points = np.searchsorted(found / max(references, 1), _RECALLS, side="left")
+        points = np.searchsorted(found / references, _RECALLS, side="left")
         return _RECALLS, np.append(precision, 0.0)[points]

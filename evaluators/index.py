@@ -170,6 +170,8 @@ class Curve:
     bars : bool
         Whether it is drawn as a histogram.
     meaning, source : str
+    panel : str
+        Lines of equal units are drawn together unless their panels differ.
     """
 
     key: str
@@ -182,3 +184,4 @@ class Curve:
     meaning: str
     source: str
     bars: bool = False
+    panel: str = ""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..core.parameters import parameter
 from .average_precision import AP_THRESHOLDS, Ranking
 from .coverage_evaluator import CoverageEvaluator
-from .index import IndexGroup, index, ratio
+from .index import Curve, IndexGroup, index, ratio
 from .overlay.coverage import CountedSets
 from .overlay.coverage_verdicts import SideVerdicts, coverage_kinds, coverage_verdicts
 from .overlay.greedy import accept_in_order
@@ -35,6 +35,7 @@ __all__ = ["APIndices", "IoU", "IoUIndices", "PanopticIndices"]
 
 _COCO = "Lin et al. 2014 (COCO)"
 _SPACENET = "Van Etten, Lindenbaum & Bacastow 2018 (SpaceNet)"
+_Numbers: TypeAlias = NDArray[np.int64] | int
 _PANOPTIC = "Kirillov et al. 2019"
 #: How far the threshold is moved to find the objects that its choice decides.
 _SHIFT = 0.05
@@ -183,6 +184,47 @@ class PanopticIndices(IndexGroup):
     )
 
 
+def _by_threshold(numerator: Callable[[_Tallies], _Numbers], denominator: Callable[[_Tallies], _Numbers]) -> Any:
+    """Return the formula of a curve over the IoU thresholds of AP; NaN where the denominator is 0."""
+
+    def curve(t: _Tallies) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        whole = np.broadcast_to(denominator(t), AP_THRESHOLDS.shape)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return AP_THRESHOLDS, np.where(whole > 0, numerator(t) / whole, np.nan)
+
+    return curve
+
+
+def _threshold_curve(key: str, title: str, meaning: str, formula: Any) -> Curve:
+    return Curve(
+        key=key,
+        title=title,
+        x="IoU threshold",
+        y="share",
+        x_unit="fraction",
+        y_unit="fraction",
+        formula=formula,
+        meaning=meaning,
+        source=_COCO,
+        panel="threshold",
+    )
+
+
+def _precision_curve(key: str, threshold: str, place: int) -> Curve:
+    return Curve(
+        key=key,
+        title=f"precision over recall, IoU {threshold}",
+        x="recall",
+        y="precision",
+        x_unit="fraction",
+        y_unit="fraction",
+        formula=lambda t: t.ranking.curve(place, t.counts.reference),
+        meaning="largest precision at this recall or a higher one; its mean is AP",
+        source=_COCO,
+        panel="recall",
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _Candidates:
     """Overlapping pairs in the order in which they are accepted.
@@ -233,6 +275,29 @@ class IoU(CoverageEvaluator):
     measures = (
         Measure(key="iou", title="IoU", unit="fraction"),
         Measure(key="confidence", title="confidence", unit="ratio"),
+    )
+
+    curves = (
+        _threshold_curve(
+            "precision_by_threshold",
+            "precision",
+            "TP/(TP+FP) at each IoU threshold of AP",
+            _by_threshold(lambda t: t.ranking.found, lambda t: t.ranking.counted),
+        ),
+        _threshold_curve(
+            "recall_by_threshold",
+            "recall",
+            "TP/(TP+FN) at each IoU threshold of AP",
+            _by_threshold(lambda t: t.ranking.found, lambda t: t.counts.reference),
+        ),
+        _threshold_curve(
+            "f1_by_threshold",
+            "F1",
+            "2 TP/(2 TP+FP+FN) at each IoU threshold of AP",
+            _by_threshold(lambda t: 2 * t.ranking.found, lambda t: t.ranking.counted + t.counts.reference),
+        ),
+        _precision_curve("precision_over_recall_50", "0.5", 0),
+        _precision_curve("precision_over_recall_75", "0.75", 5),
     )
 
     threshold: float = parameter(0.5, minimum=0.01, maximum=1.0, doc="least IoU of a match", source="SpaceNet, COCO")

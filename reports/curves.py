@@ -20,10 +20,10 @@ _DASHES = ("-", "--", ":", "-.")
 
 
 def curve_panels(evaluation: Evaluation) -> list[tuple[Curve, ...]]:
-    """Return the curves that are drawn together: lines with the same units in one panel, each histogram alone."""
+    """Return the curves that are drawn together: lines of one panel with the same units, each histogram alone."""
     panels: list[tuple[Curve, ...]] = []
-    units = groupby(evaluation.evaluator.curves, lambda curve: (curve.x_unit, curve.y_unit, curve.bars))
-    for (_, _, bars), some in units:
+    units = groupby(evaluation.evaluator.curves, lambda curve: (curve.panel, curve.x_unit, curve.y_unit, curve.bars))
+    for (*_, bars), some in units:
         found = tuple(some)
         panels += [(curve,) for curve in found] if bars else [found]
     return panels

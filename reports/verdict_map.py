@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["draw_verdicts", "verdict_figure"]
 
 #: Panels of curves below the table of the indices.
+#: Characters of the title of an index that fit beside its symbol.
+_LONG_TITLE = 28
 _MOST_PANELS = 3
 
 
@@ -167,6 +169,8 @@ def _draw_indices(axes: Axes, evaluation: Evaluation) -> None:
         cell.visible_edges = "B"
         if row == 0:
             cell.set_text_props(weight="bold")
+        elif column == 0:
+            cell.set_fontsize(9 * min(1.0, _LONG_TITLE / len(cell.get_text().get_text())))
         if column == 2:
             cell.set_text_props(ha="right")
     notes = [described(evaluation), *evaluation.notes]

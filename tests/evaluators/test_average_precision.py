@@ -116,6 +116,19 @@ def test_of_references_with_equal_iou_coco_takes_the_last_one():
     assert evaluate(detected, reference, scores, threshold=0.3).tallies.counts.true_positives == 1
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_curves_are_those_of_each_threshold_and_their_mean_is_ap(seed):
+    detected, reference = town(seed)
+    found = evaluate(detected, reference)
+    for place, threshold in enumerate(found.curves["f1_by_threshold"][0].tolist()):
+        at = evaluate(detected, reference, threshold=threshold)
+        for name in ("precision", "recall", "f1"):
+            assert found.curves[f"{name}_by_threshold"][1][place] == pytest.approx(at.values[f"iou.{name}"])
+    for key in ("50", "75"):
+        assert found.curves[f"precision_over_recall_{key}"][1].mean() == pytest.approx(found.values[f"ap.ap_{key}"])
+    assert np.isnan(evaluate([], []).curves["f1_by_threshold"][1]).all()
+
+
 def test_missing_scores_rank_last_and_without_any_the_best_iou_ranks():
     detected, reference = [house(0.1), house(500), house(30)], [house(0), house(30)]
     assert evaluate(detected, reference, [0.9, np.nan, 0.8]).values["ap.ap_50"] == 1.0

@@ -32,6 +32,12 @@ def test_lines_of_one_unit_share_a_panel_with_a_legend():
     assert len(axes[0].get_legend().get_texts()) == 2
 
 
+def test_lines_over_thresholds_and_over_recall_have_a_panel_each():
+    axes, panels = drawn("iou")
+    assert [len(panel) for panel in panels] == [3, 2]
+    assert [panel.get_xlabel() for panel in axes] == ["IoU threshold (%)", "recall (%)"]
+
+
 def test_histograms_stand_alone():
     axes, panels = drawn("shan-lee")
     assert len(panels) == 5
