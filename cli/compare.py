@@ -20,6 +20,8 @@ from .options import (
     OverwriteOption,
     PartsOption,
     QuietOption,
+    RedrawsOption,
+    ReferenceErrorOption,
     SchedulerOption,
 )
 
@@ -44,14 +46,8 @@ def compare(
     interval: Annotated[
         float, typer.Option("--interval", metavar="PERCENT", help="Level of the intervals of the differences.")
     ] = 95.0,
-    reference_error: Annotated[
-        float | None,
-        typer.Option(
-            "--reference-error",
-            metavar="M",
-            help="Redraw the reference with this digitising error, and print how far each difference moves.",
-        ),
-    ] = None,
+    reference_error: ReferenceErrorOption = None,
+    redraws: RedrawsOption = None,
     form: Annotated[Literal["table", "json", "csv", "md"], typer.Option("--format", "-f", help=FORMAT_HELP)] = "table",
     verdicts: Annotated[
         Path | None,
@@ -75,7 +71,8 @@ def compare(
     from ..core.errors import InputError, ParameterError, UnsupportedError
     from ..evaluators.registry import ALL, DEFAULT, make_evaluator
     from ..evaluators.uncertainty.paired import compare as compared
-    from ..evaluators.uncertainty.redrawn import redraw_differences, require_error
+    from ..evaluators.uncertainty.redrawn import REDRAWS, redraw_differences, require_error
+    from ..reports.format import shortened
     from ..reports.pair_text import format_pair
     from ..reports.verdict_outputs import check_targets
     from ..scenes.geodata.vector_files import read_footprints
@@ -84,6 +81,8 @@ def compare(
         raise ParameterError("two detections are compared by one evaluator at a time: name it by evaluator=")
     if building_id is not None and join_gaps is not None:
         raise InputError("blocks of joined footprints have no building ids: set building_id= or join_gaps=, not both")
+    if redraws is not None and reference_error is None:
+        raise ParameterError("redraws= needs reference_error=, the digitising error in metres")
     if reference_error is not None:
         require_error(reference_error)
     check_targets(verdicts, plot, inputs=(first, second, reference, evaluation_area), overwrite=overwrite)
@@ -91,17 +90,23 @@ def compare(
     whole = {
         "evaluation_area=": evaluation_area,
         "join_gaps=": join_gaps,
-        "reference_error=": reference_error,
-        "plot=": plot,
     }
     needs = [name for name, value in whole.items() if value is not None]
     asked = "parts=" if parts is not None else "scheduler=" if scheduler is not None else None
     if asked and needs:
         raise InputError(f"{needs[0]} needs whole files in memory: leave it out, or leave out {asked}")
     paths = first, second, reference
+    title = ", ".join(
+        f"{role}: {shortened(name, 48)}" for role, name in zip(("A", "B", "reference"), names, strict=True)
+    )
     if asked or (not needs and evaluator in (None, DEFAULT) and is_large(paths)):
-        options = InParts(parts, scheduler, building_id, crs, verdicts, overwrite, quiet)
-        result = compare_in_parts(make_evaluator(evaluator, {}), paths, options, interval=interval)
+        options = InParts(
+            *(parts, scheduler, building_id, crs, verdicts, plot, overwrite, quiet),
+            interval=interval,
+            reference_error=reference_error,
+            redraws=redraws,
+        )
+        result = compare_in_parts(make_evaluator(evaluator, {}), paths, options, title=title)
         typer.echo(format_pair(result, form, names=names))
         return
     one, two = (read_footprints(path, crs=crs) for path in (first, second))
@@ -121,7 +126,12 @@ def compare(
     if reference_error is not None:
         sets = one, two, truth.footprints
         redrawn = redraw_differences(
-            *sets, error=reference_error, evaluator=found.evaluator, area=truth.area, grid=truth.grid
+            *sets,
+            error=reference_error,
+            evaluator=found.evaluator,
+            area=truth.area,
+            grid=truth.grid,
+            redraws=redraws or REDRAWS,
         )
         found = replace(found, redrawn=redrawn)
     if found.fates is None and (verdicts is not None or plot is not None):
@@ -134,11 +144,7 @@ def compare(
         write_pair(found, verdicts, overwrite=overwrite)
     if plot is not None:
         from ..reports.figures import save_figure
-        from ..reports.format import shortened
         from ..reports.pair_map import pair_figure
 
-        title = ", ".join(
-            f"{role}: {shortened(name, 48)}" for role, name in zip(("A", "B", "reference"), names, strict=True)
-        )
         save_figure(pair_figure(found, title=title, area=truth.area), plot, overwrite=overwrite)
     typer.echo(format_pair(found, form, names=names))

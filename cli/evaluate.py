@@ -21,6 +21,8 @@ from .options import (
     OverwriteOption,
     PartsOption,
     QuietOption,
+    RedrawsOption,
+    ReferenceErrorOption,
     SchedulerOption,
 )
 
@@ -61,17 +63,8 @@ def evaluate(
     join_gaps: JoinGapsOption = None,
     crs: CrsOption = None,
     interval: IntervalOption = None,
-    reference_error: Annotated[
-        float | None,
-        typer.Option(
-            "--reference-error",
-            metavar="M",
-            help="Redraw the reference with this digitising error, and print how far each index moves.",
-        ),
-    ] = None,
-    redraws: Annotated[
-        int | None, typer.Option("--redraws", min=2, metavar="N", help="How often the reference is redrawn [50].")
-    ] = None,
+    reference_error: ReferenceErrorOption = None,
+    redraws: RedrawsOption = None,
     form: Annotated[Literal["table", "json", "csv", "md"], typer.Option("--format", "-f", help=FORMAT_HELP)] = "table",
     verdicts: Annotated[
         Path | None,
@@ -112,19 +105,22 @@ def evaluate(
     whole = {
         "evaluation_area=": evaluation_area,
         "join_gaps=": join_gaps,
-        "plot=": plot,
-        "interval=": interval,
-        "reference_error=": reference_error,
         f"evaluator={ALL}": every or None,
     }
     needs = [name for name, value in whole.items() if value is not None]
+    title = f"{short_name(detected)} against {short_name(reference)}"
     asked = "parts=" if parts is not None else "scheduler=" if scheduler is not None else None
     if asked and needs:
         raise InputError(f"{needs[0]} needs whole files in memory: leave it out, or leave out {asked}")
     if asked or (not needs and evaluator in (None, DEFAULT) and is_large((detected, reference))):
-        options = InParts(parts, scheduler, building_id, crs, verdicts, overwrite, quiet)
-        result = evaluate_in_parts(scorers[0], (detected, reference), options)
-        typer.echo(format_evaluation(result, form, title=f"{short_name(detected)} against {short_name(reference)}"))
+        options = InParts(
+            *(parts, scheduler, building_id, crs, verdicts, plot, overwrite, quiet),
+            interval=interval,
+            reference_error=reference_error,
+            redraws=redraws,
+        )
+        result, doubt = evaluate_in_parts(scorers[0], (detected, reference), options, title=title)
+        typer.echo(format_evaluation(result, form, title=title, uncertainty=doubt))
         return
     found = read_footprints(detected, crs=crs)
     given_truth = read_truth(reference, building_id=building_id, crs=crs, evaluation_area=evaluation_area)
@@ -133,7 +129,7 @@ def evaluate(
     if join_gaps is not None:
         truth = truth.joined(join_gaps)
     results = [scorer.evaluate(found, truth, area=boundary, grid=grid) for scorer in scorers]
-    result, title = results[0], f"{short_name(detected)} against {short_name(reference)}"
+    result = results[0]
     doubts: list[Uncertainty | None] = [None] * len(results)
     if interval is not None or reference_error is not None:
         from ..evaluators.uncertainty.summary import uncertainty_of

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..evaluators.base import Evaluation, Evaluator
     from ..evaluators.in_parts import ThresholdFree
     from ..evaluators.uncertainty.paired import PairedComparison
+    from ..evaluators.uncertainty.summary import Uncertainty
     from ..scenes.geodata.footprint_stream import FootprintStream
 
 __all__ = ["InParts", "compare_in_parts", "evaluate_in_parts", "is_large"]
@@ -50,12 +51,18 @@ class InParts(NamedTuple):
     building_id: str | None
     crs: str | None
     verdicts: Path | None
+    plot: Path | None
     overwrite: bool
     quiet: bool
+    interval: float | None = None
+    reference_error: float | None = None
+    redraws: int | None = None
 
 
-def evaluate_in_parts(evaluator: Evaluator, paths: tuple[str, str], options: InParts) -> Evaluation:
-    """Compare two files in parts, and write the verdicts.
+def evaluate_in_parts(
+    evaluator: Evaluator, paths: tuple[str, str], options: InParts, *, title: str
+) -> tuple[Evaluation, Uncertainty | None]:
+    """Compare two files in parts, and write the verdicts and the map; return the uncertainty where it is asked for.
 
     The work folder lies beside the file of the verdicts (else among temporary files). An interrupted evaluation keeps
     it and continues from it; it is removed at the end.
@@ -67,23 +74,54 @@ def evaluate_in_parts(evaluator: Evaluator, paths: tuple[str, str], options: InP
     detected, reference = _streams(paths, options)
     with _running(options) as (work, execution):
         comparison = evaluate_files(chosen, (detected, reference), work, **execution)
+        doubt = None
+        if options.interval is not None or options.reference_error is not None:
+            from ..evaluators.uncertainty.summary_files import uncertainty_of_files
+
+            doubt = uncertainty_of_files(
+                chosen,
+                comparison,
+                interval=options.interval,
+                reference_error=options.reference_error,
+                redraws=options.redraws,
+                executor=execution["executor"],
+                say=execution["say"],
+            )
+        if options.plot is not None:
+            from ..reports.figures import save_figure
+            from ..reports.map_in_parts import file_figure
+
+            save_figure(file_figure(comparison, title=title), options.plot, overwrite=options.overwrite)
         if options.verdicts is not None:
             execution["say"](f"writing {options.verdicts}")
             write_verdict_stream(comparison, options.verdicts, overwrite=options.overwrite)
-        return comparison.evaluation
+        return comparison.evaluation, doubt
 
 
 def compare_in_parts(
-    evaluator: Evaluator, paths: tuple[str, str, str], options: InParts, *, interval: float
+    evaluator: Evaluator, paths: tuple[str, str, str], options: InParts, *, title: str
 ) -> PairedComparison:
-    """Compare two detections of one place in parts, and write the layers; see `evaluate_in_parts`."""
+    """Compare two detections of one place in parts, and write the layers and the map; see `evaluate_in_parts`."""
     from ..evaluators.uncertainty.paired_files import compare_files
     from ..reports.pair_stream import write_pair_stream
 
     chosen = _able(evaluator)
     one, two, reference = _streams(paths, options)
     with _running(options) as (work, execution):
-        found = compare_files(chosen, (one, two, reference), work, interval=interval, **execution)
+        found = compare_files(
+            chosen,
+            (one, two, reference),
+            work,
+            interval=95.0 if options.interval is None else options.interval,
+            reference_error=options.reference_error,
+            redraws=options.redraws,
+            **execution,
+        )
+        if options.plot is not None:
+            from ..reports.figures import save_figure
+            from ..reports.map_in_parts import paired_files_figure
+
+            save_figure(paired_files_figure(found, title=title), options.plot, overwrite=options.overwrite)
         if options.verdicts is not None:
             execution["say"](f"writing {options.verdicts}")
             write_pair_stream(found, options.verdicts, overwrite=options.overwrite)
@@ -108,9 +146,13 @@ def _streams(paths: Sequence[str], options: InParts) -> list[FootprintStream]:
     from ..core.errors import InputError
     from ..reports.streamed_layers import check_streamed_output
     from ..scenes.geodata.footprint_stream import open_stream
+    from ..scenes.shipped import shipped_or_given
 
-    if Path(paths[-1]).is_dir():
-        raise InputError(f"{paths[-1]} is a scene: leave out parts=, or name its vector file")
+    if not Path(paths[-1]).is_file() and shipped_or_given(paths[-1]).is_dir():
+        asked = "parts=" if options.parts is not None else "scheduler="
+        raise InputError(
+            f"{paths[-1]} is a scene, which is compared as a whole: leave out {asked}, or name its vector file"
+        )
     if options.verdicts is not None:
         check_streamed_output(options.verdicts)
     detected = [open_stream(path, crs=options.crs) for path in paths[:-1]]

@@ -45,6 +45,8 @@ __all__ = [
     "PictureOption",
     "PluginOption",
     "QuietOption",
+    "RedrawsOption",
+    "ReferenceErrorOption",
     "RunArgument",
     "ScenesOption",
     "SchedulerOption",
@@ -218,6 +220,17 @@ PluginOption = Annotated[
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Suppress progress and messages.")]
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="Number of the run, or the first digits of its key (see 'roofbench ls').")
+]
+RedrawsOption = Annotated[
+    int | None, typer.Option("--redraws", min=2, metavar="N", help="How often the reference is redrawn [50].")
+]
+ReferenceErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        "--reference-error",
+        metavar="M",
+        help="Redraw the reference with this digitising error, and print how far each value moves.",
+    ),
 ]
 ScenesOption = Annotated[
     str | None,

@@ -5,8 +5,9 @@ The evaluator that is the default one compares files of any size; the others nee
 
 from __future__ import annotations
 
+from .overlay.file_stores import FileStores
 from .threshold_free.evaluator import ThresholdFree
 from .threshold_free.files import FileComparison, evaluate_files
 from .threshold_free.verdicts import SideVerdicts
 
-__all__ = ["FileComparison", "SideVerdicts", "ThresholdFree", "evaluate_files"]
+__all__ = ["FileComparison", "FileStores", "SideVerdicts", "ThresholdFree", "evaluate_files"]

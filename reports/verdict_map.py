@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 __all__ = ["draw_verdicts", "verdict_figure"]
 
 #: Panels of curves below the table of the indices.
+_MOST_PANELS = 3
 #: Characters of the title of an index that fit beside its symbol.
 _LONG_TITLE = 28
-_MOST_PANELS = 3
 
 
 def verdict_figure(evaluation: Evaluation, *, title: str, area: shapely.Geometry | None = None) -> Figure:

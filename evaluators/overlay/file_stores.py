@@ -31,6 +31,7 @@ from ...scenes.geodata.footprint_stream import FootprintStream, open_stream
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.outline_batch import OutlineBatch
 from ...scenes.geodata.polygon_repair import Repair
+from .outline_arrays import polygons_of
 from .outline_store import Division, OutlineStore
 
 __all__ = ["FileStores", "serve", "store_files"]
@@ -57,6 +58,18 @@ class FileStores:
     streams: tuple[FootprintStream, ...]
     stores: tuple[OutlineStore, ...]
     work: Path
+
+    @property
+    def count(self) -> int:
+        """Number of footprints of all files."""
+        return sum(len(store.objects) for store in self.stores)
+
+    def footprints(self, place: int) -> Footprints:
+        """Return the footprints of a file, which must fit into the memory, without their attributes."""
+        objects, stream = self.stores[place].objects, self.streams[place]
+        rows = np.arange(len(objects))
+        polygons = polygons_of(self.stores[place].outlines(rows), rows)
+        return Footprints(polygons=polygons, crs=stream.crs, ids=objects.ids, source=str(stream.file))
 
     def repairs(self, place: int) -> Footprints:
         """Return the name and the repairs of a file, as a set of no footprints."""

@@ -10,8 +10,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from ...scenes.geodata.footprint_stream import FootprintStream
 from ..overlay.file_stores import FileStores, store_files
 from ..overlay.left_out import repair_notes
@@ -19,9 +17,11 @@ from ..overlay.partition import PartGraph, find_pairs
 from ..threshold_free.evaluator import ThresholdFree
 from ..threshold_free.partitioned import block_tallies, evaluate_links, link_stores, require_exact
 from ..threshold_free.verdicts import SideVerdicts
-from .blocks import Blocks, linked_blocks
 from .intervals import require_level, resampled_values
 from .paired import PairedComparison, fates_of, found_of, paired
+from .part_blocks import part_blocks
+from .redrawn import REDRAWS, require_error
+from .redrawn_files import redraw_files
 
 __all__ = ["PairedFiles", "compare_files"]
 
@@ -58,6 +58,8 @@ def compare_files(
     work: Path,
     *,
     interval: float = 95.0,
+    reference_error: float | None = None,
+    redraws: int | None = None,
     parts: int | None = None,
     executor: Executor | None = None,
     say: Callable[[str], None] = lambda sentence: None,
@@ -74,6 +76,10 @@ def compare_files(
         Work folder; what is there of an interrupted comparison of the same files is used.
     interval : float
         Level of the intervals, percent.
+    reference_error : float, optional
+        Digitising error of the redrawn references, m.
+    redraws : int, optional
+        Their number.
     parts, executor, say, progress
         See `evaluate_files`.
 
@@ -87,11 +93,13 @@ def compare_files(
         Areas by pixels.
     """
     require_level(interval)
+    if reference_error is not None:
+        require_error(reference_error)
     require_exact(evaluator)
     files = store_files(streams, ("a", "b", "reference"), work, parts=parts, executor=executor, say=say)
     say("comparing part by part")
     pairs = find_pairs(files.stores, _COUPLES, work / "pairs", progress=progress, executor=executor)
-    blocks = _blocks(pairs)
+    blocks = part_blocks(pairs, _COUPLES)
     say(f"resampling {blocks.count} blocks")
     evaluations, resampled, found = [], [], []
     for place in (0, 1):
@@ -106,16 +114,16 @@ def compare_files(
         resampled.append(resampled_values(evaluation, every))
     fates = fates_of(found[0], found[1])
     comparison = paired((evaluations[0], evaluations[1]), (resampled[0], resampled[1]), fates, blocks, interval)
+    if reference_error is not None:
+        say(f"redrawing the reference {redraws or REDRAWS} times")
+        redrawn = redraw_files(
+            evaluator,
+            files.stores,
+            work,
+            [evaluation.values for evaluation in evaluations],
+            error=reference_error,
+            redraws=redraws or REDRAWS,
+            executor=executor,
+        )
+        comparison = replace(comparison, redrawn=redrawn)
     return PairedFiles(comparison, files, pairs, evaluator)
-
-
-def _blocks(pairs: PartGraph) -> Blocks:
-    links = {}
-    for place in range(3):
-        within = pairs.within(place)
-        links[place, place] = np.stack([within.first, within.second])
-    for one, two in _COUPLES:
-        overlaps = pairs.between(one, two).overlaps
-        links[one, two] = np.stack([overlaps.first, overlaps.second])
-    sides = [store.objects for store in pairs.stores]
-    return linked_blocks(links, [side.building_codes for side in sides], [side.centres for side in sides])

@@ -23,7 +23,16 @@ from ..base import Evaluator
 from ..given_footprints import GivenFootprints, GivenReference, given_sets
 from ..registry import DEFAULT, make_evaluator
 
-__all__ = ["REDRAWS", "Redraws", "changes_of", "redraw", "redraw_changes", "redraw_differences", "require_error"]
+__all__ = [
+    "REDRAWS",
+    "Redraws",
+    "changes_of",
+    "redraw",
+    "redraw_changes",
+    "redraw_differences",
+    "require_error",
+    "value_differences",
+]
 
 #: Default number of redraws.
 REDRAWS = 50
@@ -54,19 +63,22 @@ class Redraws:
         return {"error": self.error, "redraws": self.redraws, "changes": dict(self.changes)}
 
 
-def redraw(footprints: Footprints, error: float, rng: np.random.Generator) -> Footprints:
+def redraw(footprints: Footprints, error: float, *, number: int, seed: int = 0) -> Footprints:
     """Return the footprints as they might have been digitised again.
 
     Each corner moves by a normal error in x and in y; a corner that several outlines share moves once. Corners are the
     vertices that remain when an outline is simplified by `error`. The vertices between two corners move with them, so
-    that a curve stays a curve. Outlines that this makes invalid are repaired.
+    that a curve stays a curve. Outlines that this makes invalid are repaired. The error of a corner follows from its
+    coordinates, so footprints that are redrawn a few at a time are the same as all at once.
 
     Parameters
     ----------
     footprints : Footprints
     error : float
         Standard deviation of each coordinate, m.
-    rng : numpy Generator
+    number : int
+        Of the redraw.
+    seed : int
     """
     if not len(footprints) or not error:
         return footprints
@@ -86,12 +98,30 @@ def redraw(footprints: Footprints, error: float, rng: np.random.Generator) -> Fo
     kept |= first | np.append(first[1:], True)
     steps = np.hypot(*np.diff(xy, axis=0, prepend=xy[:1]).T)
     along = np.cumsum(np.where(first, 1.0, steps))
-    shift = rng.normal(0.0, error, (len(places), 2))[identity[: len(xy)]]
+    shift = error * _normal_errors(xy, number, seed)
     moved = xy + np.stack([np.interp(along, along[kept], shift[kept, axis]) for axis in (0, 1)], axis=1)
     redrawn = shapely.set_coordinates(rings.copy(), moved)
     outlines = _polygons(redrawn, part_of_ring, owner, len(footprints))
     found = Footprints.of(outlines, crs=footprints.crs, source=footprints.source)
     return dataclasses.replace(found, building_ids=_ids(footprints, found), ids=footprints.ids[found.ids], repairs=())
+
+
+def _normal_errors(points: NDArray[np.float64], number: int, seed: int) -> NDArray[np.float64]:
+    """Return two standard normal numbers for each point, which follow from its coordinates (Box-Muller)."""
+    x, y = np.ascontiguousarray((points + 0.0).T).view(np.uint64)  # -0.0 becomes 0.0
+    stream = _mixed(_mixed(np.array([seed], dtype=np.uint64)) + np.uint64(number))
+    key = _mixed(x ^ _mixed(y ^ stream))
+    uniform = [(_mixed(key + np.uint64(k)) >> np.uint64(11)).astype(np.float64) * 2.0**-53 for k in (1, 2)]
+    radius, angle = np.sqrt(-2.0 * np.log1p(-uniform[0])), 2.0 * np.pi * uniform[1]
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def _mixed(keys: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return keys whose bits are mixed (the finaliser of SplitMix64)."""
+    keys = keys + np.uint64(0x9E3779B97F4A7C15)
+    keys = (keys ^ (keys >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    keys = (keys ^ (keys >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return keys ^ (keys >> np.uint64(31))
 
 
 def _polygons(
@@ -157,8 +187,8 @@ def redraw_changes(
     chosen = make_evaluator(evaluator)
     (found,), (truth, area, grid) = given_sets([detected], reference, area, grid)
     whole = chosen.evaluate(found, truth, area=area, grid=grid)
-    stream = np.random.default_rng(seed)
-    every = [chosen.evaluate(found, redraw(truth, error, stream), area=area, grid=grid) for _ in range(redraws)]
+    truths = (redraw(truth, error, number=number, seed=seed) for number in range(redraws))
+    every = [chosen.evaluate(found, redrawn, area=area, grid=grid) for redrawn in truths]
     return Redraws(error=error, redraws=redraws, changes=changes_of(whole.values, [one.values for one in every]))
 
 
@@ -178,17 +208,19 @@ def redraw_differences(
     Both are evaluated against the same redraws. A difference that is smaller than its change is not believed.
     """
     require_error(error)
-    stream = np.random.default_rng(0)
-    truths = [reference, *(redraw(reference, error, stream) for _ in range(redraws))]
     found: list[Mapping[str, float | None]] = []
-    for truth in truths:
+    for truth in (reference, *(redraw(reference, error, number=number) for number in range(redraws))):
         one, two = (evaluator.evaluate(side, truth, area=area, grid=grid).values for side in (first, second))
-        found.append({key: _difference(value, two[key]) for key, value in one.items()})
+        found.append(value_differences(one, two))
     return Redraws(error=error, redraws=redraws, changes=changes_of(found[0], found[1:]))
 
 
-def _difference(one: float | None, two: float | None) -> float | None:
-    return None if one is None or two is None else two - one
+def value_differences(one: Mapping[str, float | None], two: Mapping[str, float | None]) -> dict[str, float | None]:
+    """Return by how much the values of B exceed those of A; None where either is undefined."""
+    return {
+        key: None if first is None or second is None else second - first
+        for (key, first), second in zip(one.items(), two.values(), strict=True)
+    }
 
 
 def require_error(error: float) -> None:

@@ -10,6 +10,7 @@ import pytest
 import shapely
 from builders.footprint_sets import random_detections, random_reference
 from harness.command_line import roofbench
+from PIL import Image
 
 import roofbench as rb
 
@@ -39,13 +40,17 @@ def test_the_command_gives_the_same_and_leaves_no_work_folder(files):
 KILLED = {
     "reading": ("roofbench.evaluators.overlay.outline_store", "OutlineStore._append", 4),
     "measuring": ("roofbench.evaluators.overlay.partition", "_pairs_of_part", 2),
+    "redrawing": ("roofbench.evaluators.uncertainty.redrawn_files", "_redrawn_values", 1),
     "writing": ("roofbench.reports.streamed_layers", "_outlines", 1),
 }
 
 
 @pytest.mark.parametrize(
     ("command", "stages"),
-    [(["evaluate", "d.gpkg", "r.fgb"], list(KILLED)), (["compare", "d.gpkg", "r.fgb", "r.fgb"], ["writing"])],
+    [
+        (["evaluate", "d.gpkg", "r.fgb"], ["reading", "measuring", "writing"]),
+        (["compare", "d.gpkg", "r.fgb", "r.fgb"], ["writing"]),
+    ],
 )
 def test_a_killed_command_leaves_nothing_half_written_and_resumes(files, command, stages):
     arguments = [*command, "--parts", "4", "--verdicts", "v.parquet"]
@@ -108,8 +113,61 @@ def test_two_detections_are_compared_in_parts(files):
         assert texts
         for name in texts:
             assert one[name].tolist() == two[name].tolist(), (layer, name)
-    refused = roofbench(*command, "--parts", "3", "--plot", "map.png", folder=files, expect=2)
-    assert "--plot needs whole files in memory" in " ".join(refused.stderr.split())
+
+
+def same_numbers(one, two, **tolerance):
+    """Compare nested contents of JSON; numbers to a tolerance."""
+    if isinstance(one, dict):
+        assert one.keys() == two.keys()
+        for key in one:
+            same_numbers(one[key], two[key], **tolerance)
+    elif isinstance(one, list):
+        assert len(one) == len(two)
+        for left, right in zip(one, two, strict=True):
+            same_numbers(left, right, **tolerance)
+    elif isinstance(one, float):
+        assert two == pytest.approx(one, **tolerance)
+    else:
+        assert one == two
+
+
+def test_uncertainties_in_parts_are_those_of_whole_files(files):
+    more = ["-f", "json", "--reference-error", "0.4", "--redraws", "3"]
+    for command in (["evaluate", "d.gpkg", "r.fgb", "--interval", "80"], ["compare", "d.gpkg", "r.fgb", "r.fgb"]):
+        whole, parts = (
+            json.loads(roofbench(*command, *more, *given, folder=files).stdout) for given in ([], ["--parts", "4"])
+        )
+        same_numbers(whole, parts, rel=1e-8, abs=1e-9)
+        found = (parts.get("uncertainty") or parts)["reference_error"]
+        assert (found["error"], found["redraws"]) == (0.4, 3)
+        assert any(found["changes"].values())
+    refused = roofbench("compare", "d.gpkg", "r.fgb", "r.fgb", "--redraws", "3", folder=files, expect=2)
+    assert "--redraws needs --reference-error" in refused.stderr
+
+
+def test_redraws_that_were_interrupted_are_not_made_again(files):
+    arguments = ["evaluate", "d.gpkg", "r.fgb", "--parts", "2", "--reference-error", "0.3", "--redraws", "3"]
+    kill([*arguments, "--verdicts", "v.fgb"], "redrawing", files)
+    assert len(list((files / ".v.fgb.parts").glob("redrawn-*.json"))) == 1
+    resumed = roofbench(*arguments, "--verdicts", "v.fgb", "-f", "json", folder=files)
+    undisturbed = roofbench(*arguments, "-f", "json", folder=files)
+    assert json.loads(resumed.stdout) == json.loads(undisturbed.stdout)
+
+
+@pytest.mark.parametrize("command", [["evaluate", "d.gpkg", "r.fgb"], ["compare", "d.gpkg", "r.fgb", "r.fgb"]])
+def test_maps_in_parts_are_those_of_whole_files(files, command):
+    for name, given in (("whole.png", []), ("parts.png", ["--parts", "3"])):
+        roofbench(*command, "--plot", name, *given, folder=files)
+    whole, parts = (Image.open(files / name).convert("L") for name in ("whole.png", "parts.png"))
+    difference = np.abs(np.asarray(whole, dtype=float) - np.asarray(parts, dtype=float))
+    assert (difference > 40).mean() < 0.001
+
+
+def test_of_many_footprints_a_map_of_cells_is_drawn(files, monkeypatch):
+    monkeypatch.setattr("roofbench.reports.map_in_parts._MOST_DRAWN", 3)
+    for command in (["evaluate", "d.gpkg", "r.fgb"], ["compare", "d.gpkg", "d.gpkg", "r.fgb"]):
+        roofbench(*command, "--plot", f"{command[0]}.png", "--parts", "3", folder=files)
+        assert (files / f"{command[0]}.png").stat().st_size > 10_000
 
 
 def test_files_of_two_places_are_named(files):
@@ -137,6 +195,7 @@ def test_a_cluster_gives_the_same_bits(files):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
+        (["--evaluation-area", "r.fgb"], "needs whole files in memory"),
         (["--join-gaps", "0.1"], "needs whole files in memory"),
         (["-e", "iou"], "compares whole files only"),
         (["--area", "pixels", "--gsd", "0.5"], "exact areas and no pixels"),
@@ -148,3 +207,11 @@ def test_what_parts_cannot_do_is_refused(files, options, sentence):
     result = roofbench("evaluate", "d.gpkg", "r.fgb", "--parts", "2", *options, folder=files, expect=2)
     assert sentence in " ".join(result.stderr.split())
     assert sorted(item.name for item in files.iterdir()) == ["d.gpkg", "r.fgb"]
+
+
+@pytest.mark.parametrize("name", ["delft", "scene"])
+def test_a_scene_as_reference_is_refused_in_parts(files, name):
+    (files / "scene").mkdir()
+    for command in (["evaluate", "d.gpkg", name], ["compare", "d.gpkg", "d.gpkg", name]):
+        refused = roofbench(*command, "--parts", "2", folder=files, expect=2)
+        assert f"{name} is a scene, which is compared as a whole: leave out --parts" in " ".join(refused.stderr.split())
