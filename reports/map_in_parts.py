@@ -97,19 +97,19 @@ def _cell_figure(
     signed : sequence of ndarray, shape (n, 2)
         Centres of the objects that are counted for a cell, and of those that are counted against it.
     every : sequence of ndarray, shape (n, 2)
-        Centres of all objects that the count is divided by.
+        Centres of all objects that the count is divided by; the first ones, the references, decide what is shown.
     heading, label : str
     scale : tuple
         Colour map, and the least and largest percentage.
     """
-    corners = [(points.min(axis=0), points.max(axis=0)) for points in every if len(points)]
-    low = np.min([corner[0] for corner in corners], axis=0)
-    high = np.max([corner[1] for corner in corners], axis=0)
+    shown = next(points for points in (*every, np.zeros((1, 2))) if len(points))
+    low, high = shown.min(axis=0), shown.max(axis=0)
     size = max(float((high - low).max()) / _CELLS, 1.0)
     columns, rows = (np.floor((high - low) / size).astype(int) + 1).tolist()
 
     def counts(points: NDArray[np.float64]) -> NDArray[np.int64]:
-        cells = np.floor((points - low) / size).astype(np.int64)
+        inside = ((points >= low) & (points <= high)).all(axis=1)
+        cells = np.floor((points[inside] - low) / size).astype(np.int64)
         found: NDArray[np.int64] = np.bincount(cells[:, 1] * columns + cells[:, 0], minlength=rows * columns)
         return found.reshape(rows, columns)
 
