@@ -102,7 +102,7 @@ def compare_in_parts(
     evaluator: Evaluator, paths: tuple[str, str, str], options: InParts, *, title: str
 ) -> PairedComparison:
     """Compare two detections of one place in parts, and write the layers and the map; see `evaluate_in_parts`."""
-    from ..evaluators.uncertainty.paired_files import compare_files
+    from ..evaluators.uncertainty.paired_files import compare_files, with_redraws
     from ..reports.pair_stream import write_pair_stream
 
     chosen = _able(evaluator)
@@ -113,10 +113,11 @@ def compare_in_parts(
             (one, two, reference),
             work,
             interval=95.0 if options.interval is None else options.interval,
-            reference_error=options.reference_error,
-            redraws=options.redraws,
             **execution,
         )
+        if options.reference_error is not None:
+            run = {name: execution[name] for name in ("executor", "say")}
+            found = with_redraws(found, error=options.reference_error, redraws=options.redraws, **run)
         if options.plot is not None:
             from ..reports.figures import save_figure
             from ..reports.map_in_parts import paired_files_figure

@@ -23,7 +23,7 @@ from .part_blocks import part_blocks
 from .redrawn import REDRAWS, require_error
 from .redrawn_files import redraw_files
 
-__all__ = ["PairedFiles", "compare_files"]
+__all__ = ["PairedFiles", "compare_files", "with_redraws"]
 
 #: Places of A, B and the reference.
 _COUPLES = ((0, 2), (1, 2), (0, 1))
@@ -58,8 +58,6 @@ def compare_files(
     work: Path,
     *,
     interval: float = 95.0,
-    reference_error: float | None = None,
-    redraws: int | None = None,
     parts: int | None = None,
     executor: Executor | None = None,
     say: Callable[[str], None] = lambda sentence: None,
@@ -76,10 +74,6 @@ def compare_files(
         Work folder; what is there of an interrupted comparison of the same files is used.
     interval : float
         Level of the intervals, percent.
-    reference_error : float, optional
-        Digitising error of the redrawn references, m.
-    redraws : int, optional
-        Their number.
     parts, executor, say, progress
         See `evaluate_files`.
 
@@ -93,8 +87,6 @@ def compare_files(
         Areas by pixels.
     """
     require_level(interval)
-    if reference_error is not None:
-        require_error(reference_error)
     require_exact(evaluator)
     files = store_files(streams, ("a", "b", "reference"), work, parts=parts, executor=executor, say=say)
     say("comparing part by part")
@@ -114,16 +106,28 @@ def compare_files(
         resampled.append(resampled_values(evaluation, every))
     fates = fates_of(found[0], found[1])
     comparison = paired((evaluations[0], evaluations[1]), (resampled[0], resampled[1]), fates, blocks, interval)
-    if reference_error is not None:
-        say(f"redrawing the reference {redraws or REDRAWS} times")
-        redrawn = redraw_files(
-            evaluator,
-            files.stores,
-            work,
-            [evaluation.values for evaluation in evaluations],
-            error=reference_error,
-            redraws=redraws or REDRAWS,
-            executor=executor,
-        )
-        comparison = replace(comparison, redrawn=redrawn)
     return PairedFiles(comparison, files, pairs, evaluator)
+
+
+def with_redraws(
+    found: PairedFiles,
+    *,
+    error: float,
+    redraws: int | None = None,
+    executor: Executor | None = None,
+    say: Callable[[str], None] = lambda sentence: None,
+) -> PairedFiles:
+    """Return the comparison with the changes of its differences under a redrawn reference; see `redraw_differences`."""
+    require_error(error)
+    say(f"redrawing the reference {redraws or REDRAWS} times")
+    comparison = found.comparison
+    redrawn = redraw_files(
+        found.evaluator,
+        found.files.stores,
+        found.files.work,
+        [comparison.first.values, comparison.second.values],
+        error=error,
+        redraws=redraws or REDRAWS,
+        executor=executor,
+    )
+    return replace(found, comparison=replace(comparison, redrawn=redrawn))
