@@ -181,7 +181,7 @@ def _file_crs(file: Path, kind: str) -> str | None:
 
         return read_las_header(file).crs
     if kind in ("image", "dem"):
-        from .geodata.raster_files import read_raster_header
+        from .geodata.raster_headers import read_raster_header
 
         return read_raster_header(file).crs
     from .geodata.vector_files import read_footprints

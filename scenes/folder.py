@@ -296,7 +296,7 @@ class _LayerFile:
 
             return read_points(self.file, window=extent)
         if self.kind in ("image", "dem") and extent is not None:
-            from .geodata.raster_files import read_raster_header
+            from .geodata.raster_headers import read_raster_header
 
             if read_raster_header(self.file).grid.part(extent) is None:
                 return None

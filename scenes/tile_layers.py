@@ -90,7 +90,7 @@ class TiledLayer:
             return _points(paths, extent, self._chunks(met))
         if not met:
             return None
-        from .geodata.raster_files import read_raster_header
+        from .geodata.raster_headers import read_raster_header
         from .geodata.raster_mosaic import mosaic_elevation, mosaic_image
 
         part = self._grid.part(extent)

@@ -45,7 +45,8 @@ def read_labels(path: str | os.PathLike[str]) -> tuple[NDArray[np.object_], dict
     """
     from rasterio import features
 
-    from .raster_files import opened, source_crs
+    from .opened_rasters import opened
+    from .raster_headers import source_crs
 
     file = Path(path)
     with opened(file) as source:

@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError
 from .crs import crs_label, same_crs
+from .image_bands import alpha_of, band_names, require_image_type
+from .opened_rasters import opened
 from .raster import Elevation, Grid, Image
-from .raster_files import RasterHeader, alpha_of, band_names, data_mask, opened, require_image_type
+from .raster_files import data_mask
+from .raster_headers import RasterHeader
 
 __all__ = ["mosaic_elevation", "mosaic_image", "raster_sources", "resampling_note", "warped_extent", "warped_size"]
 
@@ -129,6 +132,8 @@ def mosaic_elevation(headers: Sequence[RasterHeader], grid: Grid, *, crs: str) -
     for header in headers:
         if header.band_count != 1:
             raise InputError(f"{header.path} has {header.band_count} bands, expected an elevation model of one band")
+        if header.dtype.startswith("complex"):
+            raise InputError(f"{header.path} has complex numbers, expected heights: give their real part")
         if header.height_unit is not None:
             raise CRSError(
                 f"{header.path}: its heights are in {header.height_unit}, metres are needed: convert them, for "
@@ -147,13 +152,16 @@ def warped_extent(header: RasterHeader, crs: str) -> tuple[float, float, float, 
     from rasterio.errors import RasterioError
     from rasterio.warp import transform_bounds
 
+    cause: RasterioError | None = None
     try:
         bounds: tuple[float, float, float, float] = transform_bounds(header.crs, crs, *header.grid.extent)
     except RasterioError as error:
+        bounds, cause = (np.inf,) * 4, error
+    if not np.isfinite(bounds).all():
         raise CRSError(
             f"{header.path} cannot be transformed from {crs_label(header.crs)} to {crs_label(crs)}: "
-            "it is probably in another CRS than it names"
-        ) from error
+            "it is probably in another CRS than it names, set it with gdal_edit.py -a_srs"
+        ) from cause
     return bounds
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...core.errors import InputError
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation
-from ..geodata.raster_files import RasterHeader
+from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_elevation, warped_extent
 from ..ground.heights import HIGHEST_LAND, LOWEST_LAND
 from .place import Place, common_extent, extent_text, file_names, file_paths

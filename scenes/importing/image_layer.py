@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...core.errors import InputError
+from ..geodata.image_bands import assumed_bands, looks_like_values
 from ..geodata.points import PointCloud
 from ..geodata.raster import Image
-from ..geodata.raster_files import RasterHeader, assumed_bands, looks_like_values
+from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_image
 from .place import Place, extent_text, file_names, file_paths
 from .raster_layer import check_size, grid_of, note_resampling

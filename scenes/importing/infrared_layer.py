@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ..geodata.raster import Image
-from ..geodata.raster_files import RasterHeader
+from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_image
 from .place import Place, extent_text, file_names, file_paths
 from .raster_layer import note_resampling

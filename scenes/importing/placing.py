@@ -15,7 +15,7 @@ import numpy as np
 from ...core.errors import CRSError, InputError
 from ..geodata.crs import crs_label, named_crs, require_metric, same_crs, scale_warning
 from ..geodata.las_files import LasHeader
-from ..geodata.raster_files import RasterHeader
+from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import warped_extent
 from .place import Extent, ImportLog, Place, common_extent, extent_text, file_names, file_paths
 from .request import ImportRequest

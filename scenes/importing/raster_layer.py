@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ...core.errors import InputError
 from ..geodata.crs import same_crs
 from ..geodata.raster import Grid
-from ..geodata.raster_files import RasterHeader
+from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import resampling_note, warped_size
 from .place import Place, extent_text
 

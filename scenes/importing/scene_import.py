@@ -20,10 +20,11 @@ import shapely
 from ...core.output import check_folder
 from ..folder import SCENE_FILES, open_scene, save_scene
 from ..geodata.footprints import Footprints
+from ..geodata.image_bands import band_names
 from ..geodata.las_files import LasHeader, read_las_header
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation, Image
-from ..geodata.raster_files import RasterHeader, band_names, read_raster_header
+from ..geodata.raster_headers import RasterHeader, read_raster_header
 from ..scene import Scene
 from .area_layer import area_of_extent, read_area
 from .dem_layer import dem_of, dem_of_points

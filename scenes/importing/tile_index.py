@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from ...core.errors import CRSError, InputError, RoofbenchError
 from ..folder import FILES, MANIFEST, open_scene, read_manifest, write_manifest
 from ..geodata.crs import crs_label, named_crs, require_metric, same_crs
+from ..geodata.image_bands import band_names
 from ..geodata.las_files import read_chunks, read_las_header
 from ..geodata.point_chunks import read_chunk_index, write_chunk_index
 from ..geodata.raster import Grid
-from ..geodata.raster_files import RasterHeader, band_names, read_raster_header
+from ..geodata.raster_headers import RasterHeader, read_raster_header
 from ..geodata.raster_mosaic import raster_sources
 from ..scene import Scene
 from ..tile_layers import checksum

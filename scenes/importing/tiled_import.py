@@ -16,7 +16,7 @@ from ...core.errors import InputError, ParameterError
 from ...core.output import whole_folder
 from ..folder import FILES, SCENE_FILES, open_scene, write_area, write_reference
 from ..geodata.point_chunks import CHUNK_INDEX
-from ..geodata.raster_files import read_raster_header
+from ..geodata.raster_headers import read_raster_header
 from .area_layer import area_of_extent, read_area
 from .place import ImportLog, Place
 from .reference_layer import blocks_of, read_reference, rectangles_of

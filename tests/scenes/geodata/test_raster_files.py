@@ -7,14 +7,14 @@ from rasterio.enums import ColorInterp
 
 import roofbench as rb
 from roofbench.core.errors import InputError
+from roofbench.scenes.geodata.image_bands import looks_like_values
 from roofbench.scenes.geodata.raster_files import (
-    looks_like_values,
     read_elevation,
     read_image,
-    read_raster_header,
     write_elevation,
     write_image,
 )
+from roofbench.scenes.geodata.raster_headers import read_raster_header
 from roofbench.scenes.geodata.raster_mosaic import mosaic_elevation, mosaic_image
 
 CRS, WEST, SOUTH = small_scenes.CRS, small_scenes.WEST, small_scenes.SOUTH

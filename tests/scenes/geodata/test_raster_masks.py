@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 import rasterio
 from rasterio import Affine
+from rasterio.control import GroundControlPoint
 from rasterio.enums import ColorInterp
 from rasterio.warp import transform as transform_points
 
 from roofbench.core.errors import InputError
+from roofbench.scenes.geodata.image_bands import assumed_bands, band_names
 from roofbench.scenes.geodata.raster import Grid
-from roofbench.scenes.geodata.raster_files import assumed_bands, band_names, read_image, read_raster_header
+from roofbench.scenes.geodata.raster_files import read_image
+from roofbench.scenes.geodata.raster_headers import read_raster_header
 from roofbench.scenes.geodata.raster_mosaic import mosaic_elevation, mosaic_image
 
 WEST, NORTH = 500000.0, 5500040.0
@@ -164,3 +167,98 @@ def test_rasters_may_have_any_name(tmp_path, name):
     raster(tmp_path / "a.tif")
     (tmp_path / "a.tif").rename(tmp_path / name)
     assert read_image(tmp_path / name).values.shape == (4, 80, 80)
+
+
+def test_alpha_is_no_colour_wherever_it_stands(tmp_path):
+    values = np.full((5, 80, 80), 255, dtype=np.uint8)
+    values[[1, 2, 3, 4]] = np.array([200, 100, 50, 220], dtype=np.uint8)[:, None, None]
+    values[:, :20] = 0
+    for place in range(5):
+        order = np.insert(np.arange(1, 5), place, 0)
+        file = tmp_path / f"{place}.tif"
+        colours = [ColorInterp.red, ColorInterp.green, ColorInterp.blue, ColorInterp.undefined]
+        with rasterio.open(raster(file, levels=(1,) * 5).path, "r+") as target:
+            target.colorinterp = list(np.insert(np.array(colours, dtype=object), place, ColorInterp.alpha))
+            target.write(values[order])
+        image = read_image(file)
+        assert image.bands == ("red", "green", "blue", "nir")
+        assert image.valid is not None
+        assert image.valid.mean() == 0.75
+        assert image.values[:, image.valid].mean(axis=1).tolist() == [200, 100, 50, 220]
+
+
+def test_bands_with_no_data_values_of_their_own_share_a_mask(tmp_path):
+    raster(tmp_path / "a.tif", levels=(200, 100, 50), size=80)
+    bands = "".join(
+        f'<VRTRasterBand dataType="Byte" band="{band}"><NoDataValue>{empty}</NoDataValue><SimpleSource>'
+        f'<SourceFilename relativeToVRT="1">a.tif</SourceFilename><SourceBand>{band}</SourceBand>'
+        '<SrcRect xOff="0" yOff="20" xSize="80" ySize="60"/><DstRect xOff="0" yOff="20" xSize="80" ySize="60"/>'
+        "</SimpleSource></VRTRasterBand>"
+        for band, empty in ((1, 0), (2, 1), (3, 2))
+    )
+    with rasterio.open(tmp_path / "a.tif") as source:
+        place = ", ".join(map(str, source.transform.to_gdal()))
+    file = tmp_path / "a.vrt"
+    file.write_text(
+        '<VRTDataset rasterXSize="80" rasterYSize="80"><SRS>EPSG:25832</SRS>'
+        f"<GeoTransform>{place}</GeoTransform>{bands}</VRTDataset>"
+    )
+    header = read_raster_header(file)
+    for image in (read_image(file), mosaic_image([header], header.grid, crs="EPSG:25832")):
+        assert image.valid is not None
+        assert image.valid.mean() == 0.75
+        assert image.values[:, image.valid].mean(axis=1).tolist() == [200, 100, 50]
+
+
+@pytest.mark.parametrize(
+    ("texts", "names"),
+    [
+        (("Near Infrared", "Red", "Green"), ("nir", "red", "green")),
+        (("B8 - NIR", "B4 - Red", "B3 - Green"), ("nir", "red", "green")),
+        (("Blau", "Grün", "Rot"), ("blue", "green", "red")),
+        (("B", "G", "R"), ("blue", "green", "red")),
+    ],
+)
+def test_descriptions_name_the_bands_in_other_words(tmp_path, texts, names):
+    with rasterio.open(raster(tmp_path / "a.tif", levels=(200, 100, 50)).path, "r+") as target:
+        target.descriptions = texts
+    header = read_raster_header(tmp_path / "a.tif")
+    assert band_names(header, None) == names
+    assert assumed_bands(header, None) is None
+
+
+def test_descriptions_that_name_no_colour_are_noted(tmp_path):
+    with rasterio.open(raster(tmp_path / "a.tif", levels=(200, 100, 50)).path, "r+") as target:
+        target.descriptions = ("red edge", "red", "green")
+    note = assumed_bands(read_raster_header(tmp_path / "a.tif"), None)
+    assert note is not None
+    assert "'red edge'" in note
+
+
+def test_colours_of_other_models_are_refused(tmp_path):
+    with rasterio.open(raster(tmp_path / "a.tif", levels=(1, 2, 3)).path, "r+") as target:
+        target.colorinterp = [ColorInterp.hue, ColorInterp.saturation, ColorInterp.lightness]
+    with pytest.raises(InputError, match="bands of hue, lightness, saturation"):
+        read_raster_header(tmp_path / "a.tif")
+
+
+def test_ground_control_points_alone_are_refused_by_their_name(tmp_path):
+    points = [GroundControlPoint(row, row, WEST + row, NORTH - row) for row in (0, 5, 9)]
+    size = {"driver": "GTiff", "width": 9, "height": 9, "count": 3, "dtype": "uint8"}
+    with rasterio.open(tmp_path / "a.tif", "w", **size, gcps=points, crs="EPSG:25832") as target:
+        target.write(np.ones((3, 9, 9), dtype=np.uint8))
+    with pytest.raises(InputError, match="placed by ground control points alone: warp it"):
+        read_raster_header(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize(
+    ("unit", "foreign"),
+    [
+        *((text, False) for text in ("m (NAVD88)", "[m]", "metres above sea level", "m a.s.l.", "unknown")),
+        *((text, True) for text in ("mm", "US survey foot", "cm", "miles")),
+    ],
+)
+def test_heights_in_metres_are_known_whatever_follows(tmp_path, unit, foreign):
+    with rasterio.open(raster(tmp_path / "a.tif", levels=(10,), dtype="float32").path, "r+") as target:
+        target.units = (unit,)
+    assert (read_raster_header(tmp_path / "a.tif").height_unit == unit) is foreign

@@ -1,0 +1,132 @@
+"""Bands of orthoimages: which colour each shows, by its description, by the colours of the file, or by its number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.errors import InputError
+from .opened_rasters import opened
+from .raster_headers import RasterHeader
+
+__all__ = ["BANDS", "alpha_of", "assumed_bands", "band_names", "looks_like_values", "require_image_type"]
+
+#: Names that a band can have; any other in ``bands=`` is refused, ``-`` skips one.
+BANDS = ("red", "green", "blue", "nir", "grey")
+_DEFAULT_BANDS = {1: ("grey",), 3: ("red", "green", "blue"), 4: ("red", "green", "blue", "nir")}
+#: Words of descriptions, in some languages of mapping agencies.
+_WORDS = {
+    "red": {"red", "rot", "rouge", "rojo", "rosso", "rood"},
+    "green": {"green", "grün", "gruen", "vert", "verde", "groen"},
+    "blue": {"blue", "blau", "bleu", "azul", "blu", "blauw"},
+    "nir": {"nir", "ir", "infrared", "nearinfrared", "infrarot", "infrarouge", "infrarrojo", "infrarood", "pir"},
+    "grey": {"grey", "gray", "pan", "panchromatic", "grau", "gris"},
+}
+#: Letters that are the whole of a description.
+_LETTERS = {"r": "red", "g": "green", "b": "blue", "n": "nir", "i": "nir"}
+#: Words of bands between and beyond the colours.
+_SHADES = {"edge", "rededge", "swir", "shortwave", "thermal", "tir", "lwir", "coastal", "yellow"}
+#: A description that only counts.
+_NUMBER = re.compile(r"(band|layer|channel|b)?[ _-]*\d+")
+
+
+def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, ...]:
+    """Return one name per band of a file, ``"-"`` for those to skip."""
+    if bands is not None:
+        unknown = [name for name in bands if name not in (*BANDS, "-")]
+        if unknown:
+            raise InputError(
+                f"bands= has {unknown[0]!r}, which is no band name; use {', '.join(BANDS)}, and - to skip one"
+            )
+        further = header.alpha or header.mask_band
+        if len(bands) != header.band_count and not (further and len(bands) == header.band_count + 1):
+            raise InputError(
+                f"{header.path} has {header.band_count} bands, but bands= names {len(bands)} "
+                f"({','.join(bands)}): name one for each, - to skip one"
+            )
+        named = [name for name in bands if name != "-"]
+        if len(set(named)) != len(named) or not named:
+            raise InputError(f"bands={','.join(bands)} must name at least one band and none twice")
+        return tuple(bands)
+    described = tuple(map(_described, header.band_names))
+    if all(described) and len(set(described)) == header.band_count:
+        return described
+    by_colour = _names_by_colour(header.colours)
+    if by_colour is not None:
+        return by_colour
+    if header.band_count not in _DEFAULT_BANDS:
+        raise InputError(
+            f"{header.path} has {header.band_count} bands, expected 1 (grey), 3 (red, green, blue) or 4 (and nir): "
+            "name them by bands=, - to skip one"
+        )
+    return _DEFAULT_BANDS[header.band_count]
+
+
+def _names_by_colour(colours: Sequence[str]) -> tuple[str, ...] | None:
+    """Return names by colour interpretation, a fourth band of no colour as near infrared; None when they do not do."""
+    names = tuple({"gray": "grey", "undefined": "nir"}.get(colour, colour) for colour in colours)
+    return names if sorted(names) in (["blue", "green", "red"], ["blue", "green", "nir", "red"]) else None
+
+
+def assumed_bands(header: RasterHeader, bands: Sequence[str] | None) -> str | None:
+    """Return a note on names of bands that the file does not give; None when it gives all of them."""
+    names = band_names(header, bands)
+    if bands is not None or names == tuple(map(_described, header.band_names)) or len(names) == 1:
+        return None
+    texts = [text for text in header.band_names if text and not _NUMBER.fullmatch(text)]
+    if texts:
+        return (
+            f"{header.path.name} describes its bands as {', '.join(map(repr, texts))}, which name no colours: they "
+            f"were taken for {', '.join(names)}"
+        )
+    if _names_by_colour(header.colours) is None:
+        return f"{header.path.name} does not name its bands: they were taken for {', '.join(names)}"
+    unnamed = [name for name, colour in zip(names, header.colours, strict=True) if name != colour]
+    if unnamed:
+        return f"{header.path.name} does not name band {names.index('nir') + 1}: it was taken for near infrared"
+    return None
+
+
+def _described(text: str) -> str:
+    """Return the band that a description names, such as ``B8 - NIR`` or ``near infrared``; empty where it names none.
+
+    >>> _described("b4 (red)"), _described("red edge"), _described("band 4")
+    ('red', '', '')
+    """
+    words = set(re.findall(r"[^\W\d_]+", text.lower()))
+    if words & _SHADES or "short" in words:
+        return ""
+    if len(words) == 1 and text.strip().lower() in _LETTERS:
+        return _LETTERS[text.strip().lower()]
+    found = {name for name, known in _WORDS.items() if words & known}
+    return found.pop() if len(found) == 1 else ""
+
+
+def alpha_of(header: RasterHeader, names: Sequence[str]) -> bool | None:
+    """Return whether the last band is read as a mask (True), as values (False), or as the file marks it (None)."""
+    if len(names) > header.band_count and names[-1] != "-":
+        return False
+    return True if header.mask_band else None
+
+
+def looks_like_values(header: RasterHeader) -> bool:
+    """Return whether the band that is marked as alpha holds more than opaque and transparent."""
+    if not header.alpha:
+        return False
+    with opened(header.path) as source:
+        rows, columns = (min(side, 512) for side in source.shape)
+        values = source.read(source.count, out_shape=(rows, columns))
+    limits = (0, 1, np.iinfo(values.dtype).max) if values.dtype.kind == "u" else (0, 1, 255)
+    # Soft edges of a mosaic have some values between, and few pixels.
+    return len(np.unique(values)) > 8 or float(np.isin(values, limits, invert=True).mean()) > 0.1
+
+
+def require_image_type(header: RasterHeader) -> None:
+    """Raise `InputError` unless the values can be those of an orthoimage."""
+    if header.dtype not in ("uint8", "uint16"):
+        raise InputError(
+            f"{header.path} has {header.dtype} values, an orthoimage needs uint8 or uint16: convert it, for instance "
+            "with gdal_translate -ot Byte -scale"
+        )
