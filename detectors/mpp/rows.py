@@ -7,8 +7,10 @@ part
 block
     All that is built together (`blocks`).
 row
-    A block with at least `_CERTAIN_WALLS` certain party walls, or a long and narrow one with `_WALLS_OF_LONG`. Its
-    parts are cut at their probable party walls, and each piece is a house of its own unless smaller than `_ANNEX`.
+    A block with at least `_CERTAIN_WALLS` certain party walls, or a long and narrow one with `_WALLS_OF_LONG`, of which
+    one part has `_REPEATED`: houses of a row repeat under one line of roofs, while the wings of one building have a
+    step each. Its parts are cut at their probable party walls, and each piece is a house of its own unless smaller than
+    `_ANNEX`.
 building
     A block that is no row with all its parts, or a house of a row with its annexes. A part outside all blocks is a
     building, too.
@@ -34,6 +36,8 @@ __all__ = ["Levels", "find_levels"]
 #: Certain party walls that make a row of a block, and of one of `_LONG` metres or more that is `_SLENDER` times as long
 #: as wide or more.
 _CERTAIN_WALLS, _WALLS_OF_LONG = 3, 2
+#: Certain party walls that one part of a row has at least.
+_REPEATED = 2
 _LONG, _SLENDER = 25.0, 2.0
 #: Square metres: smaller pieces of a row belong to the house that they touch most; the smallest piece that is one.
 _ANNEX, _PIECE = 15.0, 8.0
@@ -103,7 +107,9 @@ def find_levels(
     for k in np.flatnonzero(looked_at).tolist():
         certain[k] = len(party_walls(rectangles[k], height, state, grid, CERTAIN))
     walls_of_block = np.bincount(block[inside], weights=certain[inside], minlength=len(blocks))
-    row = _are_rows(blocks, walls_of_block)
+    most_of_block = np.zeros(len(blocks), dtype=np.int64)
+    np.maximum.at(most_of_block, block[inside], certain[inside])
+    row = _are_rows(blocks, walls_of_block) & (most_of_block >= _REPEATED)
     outlines = outline_buildings(rectangles, blocks, grid)
     parts: list[Any] = []
     rectangle_of: list[int] = []

@@ -38,6 +38,7 @@ THRESHOLDS = {
     "radius of the opening, m": (block_cells, "_OPENING", None, (0.5, 1.0, 1.5)),
     "certain party walls of a row": (rows, "_CERTAIN_WALLS", 1000, (2, 3, 4, 1000)),
     "certain party walls of a long row": (rows, "_WALLS_OF_LONG", 1000, (2, 3, 1000)),
+    "certain party walls of one part of a row": (rows, "_REPEATED", 0, (0, 2, 3, 4)),
 }  # fmt: skip
 
 

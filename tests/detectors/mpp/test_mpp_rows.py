@@ -195,6 +195,14 @@ def test_a_long_row_needs_fewer_walls_than_a_short_block(houses, length, buildin
     assert len(found.buildings) == buildings
 
 
+def test_wings_with_a_step_each_are_one_building():
+    wings = [(10, top, 26, top + 8) for top in (10, 18, 26)]
+    roof = steps(8.0, 10.0, 0.6)
+    assert all(len(walls_at(roof, wing)) == 1 for wing in wings)
+    found, blocks = levels([(wing, roof) for wing in wings], [rectangle(*wing) for wing in wings])
+    assert len(found.buildings) == len(blocks) == 1
+
+
 def test_empty_scenes_have_no_levels():
     found = find_levels(np.empty((0, 5)), np.empty(0, dtype=object), *place(), GRID)
     assert len(found.parts) == len(found.buildings) == 0
