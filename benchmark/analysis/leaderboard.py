@@ -10,7 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ...core.parameters import parameter_text
 from ...core.resampling import expanded_level, resampling_weights
+from ...detectors.registry import DETECTORS
 from ...evaluators.base import Evaluation, Evaluator, Index
 from ...evaluators.tally import Tallies
 from ..plan import KeyedEvaluator
@@ -361,7 +363,18 @@ def _unevaluated(
 
 def repeat_command(row: RunRow) -> str:
     """Return the command that repeats one run in the foreground."""
-    _, bracket, changed = row.label.partition("[")
-    detector = row.detector + bracket + changed
+    if row.label.startswith(f"{row.detector}:"):  # a label of its own says nothing of the parameters
+        detector = f"{row.detector}[{_changed_text(row)}]"
+    else:
+        _, bracket, changed = row.label.partition("[")
+        detector = row.detector + bracket + changed
     words = ["roofbench", "detect", detector, row.recipe.word, "--seed", str(row.seed), "-o", "out.gpkg"]
     return shlex.join(words)
+
+
+def _changed_text(row: RunRow) -> str:
+    """Return the stored parameters that are not the defaults of the detector, as a selection has them."""
+    rules = DETECTORS.get(row.detector).parameters()
+    values = {name: value for name, value in row.parameters.items() if value != rules[name].default}
+    texts = {name: parameter_text(value) for name, value in values.items()}
+    return ",".join(f'{name}="{text}"' if "," in text else f"{name}={text}" for name, text in texts.items())

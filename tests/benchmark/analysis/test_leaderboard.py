@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import shlex
 
 import pytest
 import shapely
@@ -210,6 +211,19 @@ def test_failures_are_listed_before_skips_with_the_command_that_repeats_them():
     assert second.command == repeat_command(runs.rows[0])
     assert second.command == "roofbench detect 'a[x=1]' 'hamlet[seed=1]' --seed 2 -o out.gpkg"
     assert runs.board().unsuccessful == (first, second)
+
+
+def test_the_command_that_repeats_a_program_has_its_parameters():
+    from types import SimpleNamespace
+
+    from roofbench.detectors.registry import make_detector
+
+    made = make_detector("command", {"run": "sh -c 'a, b'", "label": "mine", "seeded": True})
+    recipe = Runs().add("a", 1, 1).rows[0].recipe
+    row = SimpleNamespace(detector="command", label="command:mine", parameters=made.values(), recipe=recipe, seed=3)
+    assert shlex.split(repeat_command(row))[2] == """command[run="sh -c 'a, b'",seeded=True,label=mine]"""
+    again = make_detector(shlex.split(repeat_command(row))[2])
+    assert again.values() == made.values()
 
 
 def test_an_unknown_index_is_answered_with_the_nearest():
