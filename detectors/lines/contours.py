@@ -133,11 +133,9 @@ def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float, sampl
     for index, contour in enumerate(found):
         if len(contour) < least:
             continue
-        line = contour[::-1, 0, :] + 0.5
-        steps = np.diff(contour[:, 0, :], axis=0, append=contour[:1, 0, :])
-        if np.hypot(steps[:, 0], steps[:, 1]).sum() * gsd >= shortest:
+        if cv2.arcLength(contour, True) * gsd >= shortest:
             parent = int(hierarchy[0, index, 3])
-            polylines.append(line)
+            polylines.append(contour[::-1, 0, :] + 0.5)
             shapes.append(index if parent < 0 else parent)
     offsets = np.cumsum([0, *map(len, polylines)], dtype=np.int64)
     points = np.concatenate([np.empty((0, 2)), *polylines])

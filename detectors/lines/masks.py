@@ -113,7 +113,9 @@ def _coverage(points: PointCloud, grid: Grid) -> NDArray[np.uint8]:
     margin = width // 2
     padded = cv2.copyMakeBorder(occupied, margin, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[margin:-margin, margin:-margin]
-    covered: NDArray[np.uint8] = closed[np.ix_(*_places(grid, coarse))]
+    rows, columns = _places(grid, coarse)
+    # Columns first: then whole rows are copied.
+    covered: NDArray[np.uint8] = closed.take(columns, axis=1).take(rows, axis=0)
     return covered
 
 
