@@ -15,6 +15,7 @@ Methods of numba are replaced here. They differ from numba's own only while a ke
 from __future__ import annotations
 
 import gc
+from contextlib import nullcontext
 from functools import partial
 from typing import Any
 
@@ -22,12 +23,15 @@ from llvmlite import binding
 from numba.core import compiler, cpu, dispatcher, environment, sigutils
 from numba.core.compiler_lock import global_compiler_lock
 
+from .quick_compilation import quick_compilation
+
 __all__ = ["compile_kernel", "compiles_inner", "rebuild", "reduce"]
 
 _CPUContext: Any = cpu.CPUContext
 _Dispatcher: Any = dispatcher.Dispatcher
 _get_executable = _CPUContext.get_executable
 _create_wrapper = _CPUContext.create_cpython_wrapper
+_create_callback = _CPUContext.create_cfunc_wrapper
 _add_overload = _Dispatcher.add_overload
 
 #: The kernels that are being compiled, outermost first.
@@ -50,7 +54,8 @@ def compile_kernel(kernel: Any, signature: Any) -> Any:
             gc.disable()  # numba makes very many small objects that live until the end
         _open.append(kernel)
         try:
-            return _Dispatcher.compile(kernel, signature)
+            with nullcontext() if compiles_inner() else quick_compilation():
+                return _Dispatcher.compile(kernel, signature)
         finally:
             _open.pop()
             if collects:
@@ -119,6 +124,11 @@ def _wrapper(context: Any, library: Any, description: Any, *rest: Any, **named: 
     return None
 
 
+def _callback(context: Any, library: Any, description: Any, *rest: Any) -> Any:
+    """Replace `CPUContext.create_cfunc_wrapper`, the wrapper for callers in C."""
+    return None if _is_inner(description) else _create_callback(context, library, description, *rest)
+
+
 def _executable(context: Any, library: Any, description: Any, own: Any) -> Any:
     """Replace `CPUContext.get_executable`."""
     if _is_inner(description):
@@ -156,5 +166,6 @@ def _add(dispatcher: Any, result: Any) -> None:
 
 
 _CPUContext.create_cpython_wrapper = _wrapper
+_CPUContext.create_cfunc_wrapper = _callback
 _CPUContext.get_executable = _executable
 _Dispatcher.add_overload = _add

@@ -92,18 +92,31 @@ def dominant_bins(histogram: NDArray[np.int64], part_share: float, total_share: 
     """Return which bins of a histogram belong to its dominant ranges."""
     cuts = split_parts(histogram)
     parts = len(cuts) - 1
-    totals = np.empty(parts, dtype=np.int64)
+    totals = np.zeros(parts, dtype=np.int64)
+    everything = 0
     for p in range(parts):
-        totals[p] = histogram[cuts[p] : cuts[p + 1]].sum()
+        for k in range(cuts[p], cuts[p + 1]):
+            totals[p] += histogram[k]
+        everything += totals[p]
     within = np.zeros(len(histogram), dtype=np.bool_)
-    wanted, used = total_share * histogram.sum(), 0
-    for p in np.argsort(-totals, kind="mergesort"):
-        if totals[p] == 0 or (used > 0 and used >= wanted):
+    wanted, used = total_share * everything, 0
+    while used == 0 or used < wanted:
+        largest = 0
+        for p in range(1, parts):
+            if totals[p] > totals[largest]:
+                largest = p
+        total = totals[largest]
+        if total == 0:
             break
-        first, end = cuts[p], cuts[p + 1]
-        low = high = first + np.argmax(histogram[first:end])
+        totals[largest] = 0
+        first, end = cuts[largest], cuts[largest + 1]
+        low = first
+        for k in range(first + 1, end):
+            if histogram[k] > histogram[low]:
+                low = k
+        high = low
         held = histogram[low]
-        while held < part_share * totals[p]:
+        while held < part_share * total:
             left = histogram[low - 1] if low > first else -1
             right = histogram[high + 1] if high + 1 < end else -1
             if left > right:
@@ -112,8 +125,9 @@ def dominant_bins(histogram: NDArray[np.int64], part_share: float, total_share: 
             else:
                 high += 1
                 held += right
-        within[low : high + 1] = True
-        used += totals[p]
+        for k in range(low, high + 1):
+            within[k] = True
+        used += total
     return within
 
 
@@ -135,5 +149,7 @@ def dominant_ranges(
     within = np.zeros((3, 20), dtype=np.bool_)
     for band in range(3):
         bins = (TENTHS if colours.tenths else BINS)[band]
-        within[band, :bins] = dominant_bins(histograms[band, :bins], part_share, total_share)
+        of_band = dominant_bins(histograms[band, :bins], part_share, total_share)
+        for k in range(bins):
+            within[band, k] = of_band[k]
     return within

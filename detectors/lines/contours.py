@@ -75,7 +75,9 @@ def _resample(
             distance[first + i + k + 1] = distance[first + i + k] + math.hypot(there[0] - here[0], there[1] - here[1])
         total = distance[first + i + steps]
         counts[i + 1] = max(2, round(total / spacing)) + (0 if closed else 1)
-    out_offsets = np.cumsum(counts)
+    out_offsets = counts.copy()
+    for i in range(curves):
+        out_offsets[i + 1] += out_offsets[i]
     out = np.empty((out_offsets[-1], 2))
     for i in range(curves):
         first, last = offsets[i], offsets[i + 1]

@@ -47,7 +47,9 @@ def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -
         for step in range(1, chord):
             k = (start + step) % n
             out[k] += ((curve[k, 0] - curve[start, 0]) * dy - (curve[k, 1] - curve[start, 1]) * dx) / norm
-    return np.abs(out)
+    for k in range(n):
+        out[k] = abs(out[k])
+    return out
 
 
 @kernel
@@ -89,11 +91,15 @@ def corners_of_curve(
         if span < 2:
             return np.empty(0, dtype=np.int64)
         h = accumulated_distance(curve, span, closed)
-        highest = h.max()
-        if highest > 0:
-            h /= highest
-        strength *= h
-    moved = np.sum((curve - wider) ** 2, axis=1)
+        highest = 0.0
+        for k in range(n):
+            highest = max(highest, h[k])
+        for k in range(n):
+            strength[k] *= h[k] / highest if highest > 0 else h[k]
+    moved = np.empty(n)
+    for k in range(n):
+        dx, dy = curve[k, 0] - wider[k, 0], curve[k, 1] - wider[k, 1]
+        moved[k] = dx * dx + dy * dy
     corners = [0 for _ in range(0)]
     for k in range(n):
         if closed:
@@ -132,8 +138,9 @@ def _corners_of_all(
     for i in range(len(offsets) - 1):
         first, last = offsets[i], offsets[i + 1]
         corners = corners_of_curve(points[first:last], wider[first:last], closed, chords, product, least_turn)
-        found[n : n + len(corners)] = corners
-        n += len(corners)
+        for corner in corners:
+            found[n] = corner
+            n += 1
         out_offsets[i + 1] = n
     return found[:n].copy(), out_offsets
 

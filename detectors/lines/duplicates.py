@@ -91,7 +91,8 @@ def _find(
                     duplicates[i] = True
                     break
             if abs(rotation_between(directions[i], directions[j])) > rules.tolerance:
-                oblique[found] = boxes[j]
+                for k in range(8):
+                    oblique[found, k] = boxes[j, k]
                 found += 1
         if not duplicates[i]:
             duplicates[i] = found > 0 and new_share(boxes[i], oblique[:found]) < rules.least

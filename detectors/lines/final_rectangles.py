@@ -129,7 +129,7 @@ def strip_shares(
             in_range[1] += within[1, i_bin]
             in_range[2] += within[2, q_bin]
     samples = across * down
-    return in_range.min() / samples, black / samples, filled / samples
+    return min(in_range[0], in_range[1], in_range[2]) / samples, black / samples, filled / samples
 
 
 @kernel
@@ -217,6 +217,8 @@ def final_rectangles(
             box[side] = extended_final_side(
                 colours, primary, secondary, within, rules, start if rules.independent else box, side
             )
-        out[found], final_of[i] = box, found
+        for k in range(8):
+            out[found, k] = box[k]
+        final_of[i] = found
         found += 1
     return out[:found].copy(), final_of

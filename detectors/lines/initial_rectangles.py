@@ -100,6 +100,8 @@ def initial_rectangles(
         if min(box[U1] - box[U0], box[V1] - box[V0]) < rules.least_side:
             made[i] = TOO_NARROW
         else:
-            rectangles[found], made[i] = box, found
+            for k in range(8):
+                rectangles[found, k] = box[k]
+            made[i] = found
             found += 1
     return rectangles[:found].copy(), made

@@ -85,7 +85,10 @@ def _first_heights(
             for m in range(max(0, i - 1), min(rows, i + 2)):
                 for n in range(max(0, j - 1), min(columns, j + 2)):
                     wide[i, j] = max(wide[i, j], tops[m, n])
-    highest = tops.max()
+    highest = -np.inf
+    for i in range(rows):
+        for j in range(columns):
+            highest = max(highest, tops[i, j])
     first = np.zeros((rows, columns))
     for i in range(rows):
         y = frame.north - (i + 0.5) * size
@@ -249,9 +252,8 @@ def _expose(values: NDArray[np.uint8], spread: NDArray[np.float32], noise: float
     for b in range(bands):
         for r in range(-half, rows + half):
             source = values[b, min(max(r, 0), rows - 1)]
-            padded[:half], padded[half + columns :] = source[0], source[-1]
-            for c in range(columns):
-                padded[half + c] = source[c]
+            for c in range(columns + 2 * half):
+                padded[c] = source[min(max(c - half, 0), columns - 1)]
             _weighted(ring[(r + half) % (2 * half + 1)], padded[half:], spread[0])
             for t in range(1, half + 1):
                 _add_pair(ring[(r + half) % (2 * half + 1)], padded[half - t :], padded[half + t :], spread[t])

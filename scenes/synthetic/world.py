@@ -161,9 +161,10 @@ def _fill_cells(
     cursor = np.zeros(0, dtype=np.int64)
     for filling in (False, True):
         if filling:
-            start[1:] = np.cumsum(start[1:])
+            for cell in range(rows * columns):
+                start[cell + 1] += start[cell]
             items = np.empty(start[-1], dtype=np.int32)
-            cursor = start[:-1].copy()
+            cursor = start.copy()
         for k in range(len(boxes)):
             left = max(0, int((boxes[k, 0] - _REACH) // _CELL))
             right = min(columns - 1, int((boxes[k, 2] + _REACH) // _CELL))
