@@ -1,8 +1,7 @@
-"""Speed and memory of the marked point process: stages, proposals, quality against time, threads, bytes a cell.
+"""Speed and memory of the marked point process: stages, threads, bytes a cell.
 
-Run by hand: ``python tests/performance/bench_mpp.py [stages] [moves] [budget] [threads] [span] [memory]`` (all
-without names), ``--scenes toronto-a,vaihingen-a --repeats 5 --plot docs/images/mpp-budget.png``, and
-``--level`` chooses the level.
+Run by hand: ``python tests/performance/bench_mpp.py [stages] [threads] [span] [memory]`` (all without names),
+``--scenes toronto-a,vaihingen-a --repeats 5``; ``--level`` sets the level, ``--change optimiser=rjmcmc`` the sampler.
 
 From arrays in memory to rectangles, after the kernels are compiled. CPU seconds of one thread where threads are not the
 subject, the median and the least of the repeats. Threads: wall seconds of one and of two threads in turn, side by side,
@@ -36,14 +35,12 @@ STAGES = {
     "tables": ("preparation", "make_tables"),
     "boxes": ("preparation", "propose_boxes"),
     "energies of boxes": ("preparation", "_rated"),
-    "local search of tiles": ("annealing", "local_search"),
+    "local search": ("whole_scene", "search"),
     "chains": ("annealing", "run_chain"),
-    "local search of seams": ("city", "search"),
-    "walls": ("city", "close_walls"),
+    "walls": ("whole_scene", "close_walls"),
     "footprints": ("mpp_detector", "as_footprints"),
 }
-LEVEL = "building"
-EFFORTS = (0, 0.1, 0.25, 0.5, 1, 2, 4)
+LEVEL, CHANGE = "building", ""
 
 
 def scene_of(name):
@@ -73,7 +70,7 @@ def scene_of(name):
 
 def detect(scene, seed=0, **parameters):
     named = ",".join(f"{name}={value}" for name, value in {"level": LEVEL, **parameters}.items())
-    return rb.make_detector(f"mpp[{named}]").detect(scene, np.random.default_rng(seed))
+    return rb.make_detector(f"mpp[{named}{CHANGE}]").detect(scene, np.random.default_rng(seed))
 
 
 def module(name):
@@ -106,104 +103,13 @@ def stages(scenes, repeats):
             runs.append(time.process_time() - began)
             parts.append(dict(seconds))
         size, cell = len(scene.points), found.metadata["cell"]
-        proposals = found.metadata["trace"]["proposals"][-1]
-        print(
-            f"\n{scene.name}: {size:,} points, cells of {cell:g} m, {len(found)} rectangles, {proposals:,.0f} proposals"
-        )
+        print(f"\n{scene.name}: {size:,} points, cells of {cell:g} m, {len(found)} footprints")
         print(f"  all stages {statistics.median(runs):8.3f} s  (least {min(runs):.3f} s)")
         for stage in STAGES:
             if any(stage in part for part in parts):
                 print(f"  {stage:24s}{1e3 * statistics.median(part.get(stage, 0) for part in parts):7.1f} ms")
     for stage, (room, name) in STAGES.items():
         setattr(module(room), name, held[stage])
-
-
-def moves(scenes, repeats):
-    """Chains of the tile with most boxes, with the shares of the moves changed."""
-    from roofbench.detectors.mpp.sampler import Trace
-
-    annealing = module("annealing")
-    run_chain = annealing.run_chain
-    calls = []
-
-    def kept(*args):
-        calls.append((*args[:5], args[5].copy()))
-        return run_chain(*args)
-
-    print("\nproposals a second of the tile with most boxes (shares of births + deaths, splits + merges; accepted)")
-    for scene, _ in scenes:
-        calls.clear()
-        annealing.run_chain = kept
-        detect(scene)
-        annealing.run_chain = run_chain
-        window, births, start, schedule, capacity, state = max(calls, key=lambda call: len(call[1].boxes))
-        mixes = {"as by default": (schedule.jump_share, schedule.split_share)}
-        mixes |= {"births and deaths": (0.98, 0.0), "splits and merges": (0.0, 0.98)}
-        mixes["shifts, edges, sides, turns"] = (0.0, 0.0)
-        for label, (jump, split) in mixes.items():
-            rates = []
-            changed = schedule._replace(proposals=20000, jump_share=jump, split_share=split, stride=20000)
-            for _ in range(repeats):
-                began = time.process_time()
-                _, _, trace, _ = run_chain(window, births, start, changed, capacity, state.copy())
-                rates.append(20000 / (time.process_time() - began))
-            accepted = trace[:, Trace.ACCEPTED :].sum() / trace[:, Trace.TRIED : Trace.ACCEPTED].sum()
-            rate = statistics.median(rates)
-            print(f"  {scene.name:14s}{label:30s}{rate:12,.0f}/s  ({jump:.2f}, {split:.2f}; {accepted:.1%})")
-
-
-def budget(scenes, repeats, plot):
-    evaluator = rb.make_evaluator("threshold-free")
-    print(
-        "\n| scene | effort | proposals | CPU s | energy | Q_l % | Q_lp % | M_d % |\n|---|--:|--:|--:|--:|--:|--:|--:|"
-    )
-    curves = {}
-    for scene, reference in scenes:
-        if reference is None:
-            continue
-        for effort in EFFORTS:
-            seconds, rows = [], []
-            for seed in range(repeats):
-                began = time.process_time()
-                found = detect(scene, seed, effort=effort)
-                seconds.append(time.process_time() - began)
-                result = evaluator.evaluate(found, reference)
-                shares = (result.object.quality, result.pixel.quality, result.object.multiple_detection_rate)
-                rows.append([found.metadata["energy"], *(100 * share for share in shares)])
-            energy, by_object, pixel, multiple = np.mean(rows, axis=0)
-            proposals, least = found.metadata["trace"]["proposals"][-1], min(seconds)
-            spread = np.std(np.array(rows)[:, 1:3], axis=0)
-            curves.setdefault(scene.name, []).append((least, by_object, pixel, *spread, effort))
-            print(
-                f"| {scene.name} | {effort:g} | {proposals:,.0f} | {least:.2f} | {energy:,.0f} | {by_object:.1f} "
-                f"| {pixel:.1f} | {multiple:.1f} |",
-                flush=True,
-            )
-    if plot:
-        draw(curves, plot)
-
-
-def draw(curves, path):
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
-    panels = figure.subplots(1, 2)
-    for panel, column, title in zip(panels, (1, 2), ("object quality, %", "pixel quality, %"), strict=True):
-        for name, points in curves.items():
-            values = np.array(points)
-            panel.errorbar(
-                values[:, 0], values[:, column], yerr=values[:, column + 2], marker="o", capsize=2, label=name
-            )
-            for row in values[np.isin(values[:, 5], (0.25, 1, 2, 4))]:
-                place = (row[0], row[column])
-                panel.annotate(f"{row[5]:g}", place, xytext=(0, 7), textcoords="offset points", fontsize=8, ha="center")
-        panel.set_title(title, fontsize=10)
-        panel.set_xlabel("CPU seconds of one core")
-        panel.set_xlim(left=0)
-        panel.margins(y=0.15)
-        panel.grid(alpha=0.3)
-    panels[1].legend(fontsize=8, title="numbers: effort", title_fontsize=8)
-    figure.savefig(path, dpi=100)
 
 
 def threads(scenes, repeats):
@@ -306,15 +212,15 @@ def save(scene, folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("parts", nargs="*", help="stages, moves, budget, threads, span, memory")
+    parser.add_argument("parts", nargs="*", help="stages, threads, span, memory")
     parser.add_argument("--scenes", default="toronto-a,vaihingen-a")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--level", default="building", help="part, building or block")
-    parser.add_argument("--plot", help="where to save the picture of quality against time")
+    parser.add_argument("--change", default="", help="further parameters of mpp")
     options = parser.parse_args()
-    global LEVEL
-    LEVEL = options.level
-    parts = options.parts or ["stages", "moves", "budget", "threads", "span", "memory"]
+    global LEVEL, CHANGE
+    LEVEL, CHANGE = options.level, f",{options.change}" if options.change else ""
+    parts = options.parts or ["stages", "threads", "span", "memory"]
     if parts == ["memory-of"]:
         memory(options.scenes)
         return
@@ -322,10 +228,6 @@ def main():
     scenes = [scene_of(name) for name in options.scenes.split(",")]
     if "stages" in parts:
         stages(scenes, options.repeats)
-    if "moves" in parts:
-        moves(scenes, options.repeats)
-    if "budget" in parts:
-        budget(scenes, options.repeats, options.plot)
     if "threads" in parts:
         threads(scenes, options.repeats)
     if "span" in parts:

@@ -1,10 +1,10 @@
 """How the result of the marked point process moves: the tables and figures of docs/results/mpp.md.
 
 Run by hand: ``python tests/performance/study_mpp.py ablation --folders delft,ign`` and the same with ``readings``,
-``sensitivity``, ``points``, ``seeds``, ``ground``, ``detectors``, ``shapes`` or ``pictures``; figures go to
+``sensitivity``, ``points``, ``ground``, ``detectors``, ``shapes`` or ``pictures``; figures go to
 docs/images.
 
-Small presets of one or two scene seeds and the real scenes in folders (one chain, or three). Q_l is object quality
+Small presets of one or two scene seeds and the real scenes in folders. Q_l is object quality
 of the buildings, Q_lp pixel quality, both in percent by the threshold-free evaluator (nearest matching, exact areas);
 of a real scene the second number is agreement: the area that all footprints have in common with all of the reference,
 as a share of the area of both together, within the evaluation area. The detector never sees classes, and sees no image.
@@ -25,14 +25,17 @@ import roofbench as rb
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 #: The references of the presets are parts of buildings, one rectangle each.
 LEVEL = "part"
+#: Presets with an image, and the detectors that are compared there.
+IMAGED = ("fairfield-1", "fairfield-2", "fairfield-3", "knox", "moonee-ponds")
+RIVALS = (f"mpp[level={LEVEL}]", "ndsm", "original", "improved")
 PRESETS = ("vaihingen-a-small", "toronto-a-small", "knox-small")
 ABLATIONS = {
     "as it is": "",
     "the printed algorithm": "mpp-printed",
-    "empty start": "start=empty",
-    "no chain: greedy start and local search": "effort=0",
-    "no local search: empty start, chain alone": "sweeps=0",
-    "the same, 16 times the proposals": "sweeps=0,effort=4",
+    "the sampler as well": "optimiser=rjmcmc",
+    "the sampler, empty start": "optimiser=rjmcmc,start=empty",
+    "the sampler, empty start, no local search": "optimiser=rjmcmc,start=empty,sweeps=0",
+    "the same, 16 times the proposals": "optimiser=rjmcmc,start=empty,sweeps=0,effort=4",
     "flat roofs alone": "roofs=flat",
     "no texture": "texture_weight=0",
     "no superstructures": "carried_share=1.1",
@@ -72,7 +75,7 @@ READINGS = {
 FACTORS = (0.5, 2.0)
 NUMBERS = (
     "price", "fit_weight", "least_tau", "low_price", "void_price", "texture_weight", "texture_limit", "least_height",
-    "least_side", "roof_price", "roof_step", "overlap", "ground_error", "effort", "slender",
+    "least_side", "roof_price", "roof_step", "overlap", "ground_error", "slender",
     "part_share", "least_evidence",
 )  # fmt: skip
 OTHERS = {
@@ -85,23 +88,22 @@ OTHERS = {
 class Case:
     """Scenes that share a column of a table."""
 
-    def __init__(self, name, scenes, chains, *, real=False):
-        self.name, self.scenes, self.chains, self.real = name, scenes, chains, real
+    def __init__(self, name, scenes, *, real=False):
+        self.name, self.scenes, self.real = name, scenes, real
 
     def quality(self, change="", points=None, *, dem=True):
-        """Return mean object and pixel quality over scenes and chains, percent; `points` maps a cloud to another."""
+        """Return mean object and pixel quality over scenes, percent; `points` maps a cloud to another."""
         rows = []
         for scene in self.scenes:
             cloud = scene.points.unclassified() if points is None else points(scene.points.unclassified())
             seen = rb.Scene(scene.name, scene.extent, crs=scene.crs, points=cloud, dem=scene.dem if dem else None)
-            for chain in range(self.chains):
-                rows.append(indices(scene, seen, change, chain, real=self.real))
+            rows.append(indices(scene, seen, change, real=self.real))
         return np.nanmean(np.array(rows, dtype=float), axis=0)
 
 
-def indices(scene, seen, change, chain, *, real):
+def indices(scene, seen, change, *, real):
     detector = rb.make_detector(change if change == "mpp-printed" else f"mpp[level={LEVEL},{change}]")
-    found = detector.detect(seen, np.random.default_rng(chain))
+    found = detector.detect(seen, np.random.default_rng(0))
     result = rb.evaluate(found, scene.reference, area=scene.area)
     by_object, pixel = result.object.quality, result.pixel.quality
     if real:
@@ -122,9 +124,9 @@ def scene_of(name, seed):
     return rb.make_scene(name, seed=seed)
 
 
-def cases(folders, presets=PRESETS, seeds=(1, 2), chains=3):
-    made = [Case(name, [scene_of(name, seed) for seed in seeds], 1) for name in presets]
-    return made + [Case(Path(folder).name, [rb.open_scene(folder)], chains, real=True) for folder in folders]
+def cases(folders, presets=PRESETS, seeds=(1, 2)):
+    made = [Case(name, [scene_of(name, seed) for seed in seeds]) for name in presets]
+    return made + [Case(Path(folder).name, [rb.open_scene(folder)], real=True) for folder in folders]
 
 
 def head(chosen, first):
@@ -143,7 +145,7 @@ def line(label, values, base=None):
 
 
 def ablation(folders):
-    chosen = cases(folders, chains=1)
+    chosen = cases(folders)
     head(chosen, "change")
     base = None
     for label, change in ABLATIONS.items():
@@ -154,7 +156,7 @@ def ablation(folders):
 
 def sensitivity(folders):
     """Print the mean change of quality with each parameter; draw its range over the values, a bar a scene."""
-    chosen = cases(folders, seeds=(1,), chains=1)
+    chosen = cases(folders, seeds=(1,))
     defaults = rb.make_detector("mpp").values()
     base = np.array([case.quality() for case in chosen])
     sweeps = {name: tuple(round(defaults[name] * factor, 6) for factor in FACTORS) for name in NUMBERS} | OTHERS
@@ -244,16 +246,6 @@ def points(folders):
         line(label, [case.quality(points=change, dem=False) for case in chosen])
 
 
-def seeds(folders):
-    print("\n| scene | chains | Q_l: mean, least, most, sd | Q_lp: mean, least, most, sd |\n|---|--:|---|---|")
-    for case in cases(folders, seeds=(1,)):
-        scene = case.scenes[0]
-        seen = rb.Scene(scene.name, scene.extent, crs=scene.crs, points=scene.points.unclassified(), dem=scene.dem)
-        rows = np.array([indices(scene, seen, "", chain, real=case.real) for chain in range(12)])
-        text = (f"{v.mean():.1f}, {v.min():.1f}, {v.max():.1f}, {v.std(ddof=1):.2f}" for v in rows.T)
-        print(f"| {case.name} | {len(rows)} | " + " | ".join(text) + " |", flush=True)
-
-
 def ground(folders):
     chosen = cases(folders, presets=("toronto-a", "vaihingen-a", "knox", "moonee-ponds"), seeds=(1,))
     head(chosen, "ground")
@@ -261,21 +253,26 @@ def ground(folders):
     line("own ground surface", [case.quality(dem=False) for case in chosen])
 
 
-def detectors(_folders):
-    """Mean of three scene seeds: the process sees points and DEM, the others the image as well."""
-    presets = ("fairfield-1", "fairfield-2", "fairfield-3", "knox", "moonee-ponds")
+def detectors(_folders, presets=IMAGED, scene_seeds=(1, 2, 3)):
+    """Print means over scene seeds, and the lead of the process: it sees points and DEM, the others the image, too."""
     print("\n| preset | detector | C_m % | C_r % | Q_l % | M_d % | Q_lp % |\n|---|---|--:|--:|--:|--:|--:|")
     for preset in presets:
-        scenes = [scene_of(preset, seed) for seed in (1, 2, 3)]
-        for name in ("mpp", "ndsm", "original", "improved"):
-            rows = []
-            for scene in scenes:
-                found = rb.make_detector(name).detect(scene.for_detection(), np.random.default_rng(0))
-                result = rb.evaluate(found, scene.reference)
-                shares = result.object.completeness, result.object.correctness, result.object.quality
-                shares += result.object.multiple_detection_rate, result.pixel.quality
-                rows.append([100 * (share or 0) for share in shares])
-            print(f"| {preset} | {name} | " + " | ".join(f"{v:.1f}" for v in np.mean(rows, axis=0)) + " |", flush=True)
+        found = {name: np.array(list(rows_of(name, preset, scene_seeds))) for name in RIVALS}
+        for name, rows in found.items():
+            print(f"| {preset} | {name} | " + " | ".join(f"{v:.1f}" for v in rows.mean(axis=0)) + " |", flush=True)
+        for name in RIVALS[1:]:
+            lead = found[RIVALS[0]] - found[name]
+            mean, error = lead.mean(axis=0), lead.std(axis=0, ddof=1) / np.sqrt(len(lead))
+            print(f"  lead over {name}: Q_l {mean[2]:+.1f} ± {error[2]:.1f}, Q_lp {mean[4]:+.1f} ± {error[4]:.1f}")
+
+
+def rows_of(name, preset, scene_seeds):
+    for seed in scene_seeds:
+        scene = rb.make_scene(preset, seed=seed)
+        found = rb.make_detector(name).detect(scene.for_detection(), np.random.default_rng(0))
+        result = rb.evaluate(found, scene.reference)
+        shares = result.object.completeness, result.object.correctness, result.object.quality
+        yield [100 * (share or 0) for share in (*shares, result.object.multiple_detection_rate, result.pixel.quality)]
 
 
 def best_rectangle(polygon):
@@ -337,7 +334,7 @@ def pictures(folders):
     from roofbench.reports.steps.step_figure import step_figure
 
     scene = rb.open_scene(folders[0])
-    for step in rb.make_detector("mpp").steps(scene, np.random.default_rng(0)):
+    for step in rb.make_detector("mpp[optimiser=rjmcmc]").steps(scene, np.random.default_rng(0)):
         if step.name in ("evidence", "convergence", "buildings"):
             save(step_figure(step), f"mpp-{step.name}.png")
 
@@ -360,7 +357,6 @@ STUDIES = {
     "readings": readings,
     "sensitivity": sensitivity,
     "points": points,
-    "seeds": seeds,
     "ground": ground,
     "detectors": detectors,
     "shapes": shapes,
@@ -372,8 +368,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("study", choices=tuple(STUDIES))
     parser.add_argument("--folders", default="", help="scene folders with a reference, by commas")
+    parser.add_argument("--presets", default=",".join(IMAGED), help="of detectors, by commas")
+    parser.add_argument("--seeds", default="1-3", help="of detectors: first and last seed")
     options = parser.parse_args()
-    STUDIES[options.study]([folder for folder in options.folders.split(",") if folder])
+    folders = [folder for folder in options.folders.split(",") if folder]
+    if options.study == "detectors":
+        first, last = map(int, options.seeds.split("-"))
+        detectors(folders, options.presets.split(","), range(first, last + 1))
+    else:
+        STUDIES[options.study](folders)
 
 
 if __name__ == "__main__":
