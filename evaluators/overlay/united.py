@@ -136,7 +136,7 @@ def _gather(
 def _covered(edges: NDArray[np.float64], second: NDArray[np.int64]) -> float:
     """Return the area that the members cover; `second` is -1 where a member is one polygon alone."""
     n = len(edges)
-    edges = edges[np.argsort(edges[:, 1])]
+    edges = edges[np.argsort(edges[:, 1], kind="mergesort")]
     heights = np.empty(2 * n + 16)
     count = 0
     for i in range(n):
@@ -167,7 +167,8 @@ def _covered(edges: NDArray[np.float64], second: NDArray[np.int64]) -> float:
                     heights = larger
                 heights[count] = cy + (top - cy) * (low / (low - high))
                 count += 1
-    heights = np.sort(heights[:count])
+    # The quicksort of the compiler is quadratic for rows of sorted heights.
+    heights = heights[:count][np.argsort(heights[:count], kind="mergesort")]
     active = np.empty(n, dtype=np.int64)
     along = np.empty(n)
     inside = np.zeros(2 * len(second), dtype=np.bool_)
@@ -194,7 +195,7 @@ def _covered(edges: NDArray[np.float64], second: NDArray[np.int64]) -> float:
             along[i] = edges[e, 0] + share * (edges[e, 2] - edges[e, 0])
         # Edges that go on are in order already; many new ones are sorted, few are inserted.
         if passing - kept > _MANY_NEW:
-            order = np.argsort(along[:passing])
+            order = np.argsort(along[:passing], kind="mergesort")
             along[:passing], active[:passing] = along[order], active[order]
         for i in range(passing):
             e, x = active[i], along[i]
