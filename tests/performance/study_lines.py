@@ -22,6 +22,8 @@ IMAGES = Path(__file__).parents[2] / "docs" / "images"
 FAIRFIELD = ("fairfield-1", "fairfield-2", "fairfield-3")
 AREAS = {"Fairfield 1-3": FAIRFIELD, "Moonee Ponds": ("moonee-ponds",), "Knox": ("knox",)}
 COLUMNS = ("C_m", "C_r", "Q_l", "M_d", "D_o", "C_rd", "C_rr", "C_mp", "C_rp", "Q_lp", "RMSE m")
+#: Columns of the matchings other than the nearest centre.
+OTHER = ("Q_l", "M_d", "Q_lp")
 
 ABLATIONS = {
     "original": (
@@ -82,9 +84,7 @@ PICTURED = {
     "original-04-initial-rectangles",
     "original-05-final-rectangles",
     "improved-02-lines",
-    "improved-05-votes",
-    "improved-06-final-rectangles",
-    "improved-07-histograms",
+    "improved-05-final-rectangles",
 }
 
 
@@ -232,7 +232,8 @@ def tiles(seeds):
         ("all", [scene.reference for scene in scenes]),
         ("above T_h of their tile", [above_tile(scene) for scene in scenes]),
     ):
-        row = means([indices(scene, "original", known) for scene, known in zip(scenes, references, strict=True)])
+        pairs = zip(scenes, references, strict=True)
+        row = means([indices(scene, "original[ground=tile-dem]", known) for scene, known in pairs])
         print(f"| {label} | {sum(map(len, references))} | {cells(row)} |", flush=True)
 
 
@@ -277,8 +278,8 @@ def pictures(_seeds):
 
 
 def modes(seeds, folders):
-    """Print every mode of both detectors on the papers' presets and on scene folders, by two matchings."""
-    columns = ("C_m", "C_r", "Q_l", "M_d", "Q_l overlap", "M_d overlap", "Q_lp")
+    """Print every mode of both detectors on the papers' presets and on scene folders, by three matchings."""
+    columns = ("C_m", "C_r", "Q_l", "M_d", "Q_lp", *(f"{name} {m}" for m in ("one-pass", "overlap") for name in OTHER))
     print(f"| detector, area | {' | '.join(columns)} |\n|---|{'---|' * len(columns)}")
     areas = {area: [scene_of(name, seed) for name in names for seed in seeds] for area, names in AREAS.items()}
     areas |= {Path(folder).name: [rb.open_scene(folder)] for folder in folders}
@@ -292,14 +293,14 @@ def modes(seeds, folders):
 
 def of_matchings(scene, selection):
     found = rb.make_detector(selection).detect(scene.for_detection(), np.random.default_rng(0))
-    nearest, overlap = (
-        rb.evaluate(found, scene.reference, area=scene.area, matching=matching) for matching in ("nearest", "overlap")
+    nearest, *others = (
+        rb.evaluate(found, scene.reference, area=scene.area, matching=matching)
+        for matching in ("nearest", "one-pass", "overlap")
     )
-    one, two = nearest.object, overlap.object
-    shares = (
-        one.completeness, one.correctness, one.quality, one.multiple_detection_rate, two.quality,
-        two.multiple_detection_rate, nearest.pixel.quality,
-    )  # fmt: skip
+    one = nearest.object
+    shares = [one.completeness, one.correctness, one.quality, one.multiple_detection_rate, nearest.pixel.quality]
+    for other in others:
+        shares += [other.object.quality, other.object.multiple_detection_rate, other.pixel.quality]
     return [100 * (share or 0.0) for share in shares]
 
 
