@@ -16,6 +16,8 @@ from .schema import prepare
 __all__ = ["connect", "run_filter"]
 
 _BUSY_SECONDS = 60
+#: Bytes of the header of a database.
+_SMALLEST = 100
 
 
 def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
@@ -30,6 +32,10 @@ def connect(path: Path, *, must_exist: bool = False) -> sqlite3.Connection:
     """
     if must_exist and not path.is_file():
         raise InputError(f"{path}: no such results store; 'roofbench run' makes one, or name it by store=")
+    size = path.stat().st_size if path.is_file() else 0
+    if (must_exist and size == 0) or 0 < size < _SMALLEST:
+        # SQLite takes such a file for an empty database and would fill it.
+        raise InputError(f"{path} is empty or cut off ({size} bytes), no results store: name another file by store=")
     if not path.parent.is_dir():
         raise OutputError(f"{path} cannot be written: there is no folder {path.parent}")
     # SQLite needs to write side files beside the store; without permission it is opened for reading only.

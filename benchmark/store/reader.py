@@ -17,6 +17,7 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..identity.keys import SourceClosure
 from ..identity.recipes import PluginRecipe, SceneRecipe
+from .cells import decoding, json_of
 from .database import run_filter
 from .outcomes import Status, footprints_of
 from .records import RunRow, StoredScene
@@ -35,6 +36,10 @@ class StoreReader:
     path: Path
     _db: sqlite3.Connection
 
+    def _json(self, text: Any, what: str) -> Any:
+        """Return what a cell keeps as JSON; `what` names it in an error."""
+        return json_of(text, f"{self.path}: {what}")
+
     def last_plan(self) -> Mapping[str, Any]:
         """Return the content of the plan that was run last."""
         row = self._db.execute("SELECT content FROM plans ORDER BY id DESC LIMIT 1").fetchone()
@@ -42,12 +47,13 @@ class StoreReader:
             raise InputError(
                 f"{self.path} contains no plan to resume: name a suite or scenes; to resume a sweep repeat its command"
             )
-        content: Mapping[str, Any] = json.loads(row["content"])
+        content: Mapping[str, Any] = self._json(row["content"], "the plan that was run last")
         return content
 
     def plans(self) -> list[Mapping[str, Any]]:
         """Return the contents of all plans, the one that was run last first."""
-        return [json.loads(row["content"]) for row in self._db.execute("SELECT content FROM plans ORDER BY id DESC")]
+        rows = self._db.execute("SELECT id, content FROM plans ORDER BY id DESC")
+        return [self._json(row["content"], f"plan {row['id']}") for row in rows]
 
     def statuses(self, keys: Iterable[str]) -> dict[str, tuple[int, Status, str]]:
         """Return (run id, status, reason) of those keys that are stored."""
@@ -141,38 +147,40 @@ class StoreReader:
         shapes = self._db.execute(
             "SELECT id, wkb FROM scene_references WHERE scene_id = ? ORDER BY position", (scene_id,)
         ).fetchall()
-        recipe = SceneRecipe.from_dict(json.loads(row["recipe"]))
-        reference = None
-        if row["reference_count"] is not None:
-            reference = footprints_of(
-                [shape["wkb"] for shape in shapes],
+        with decoding(f"{self.path}: scene {scene_id}"):
+            recipe = SceneRecipe.from_dict(json.loads(row["recipe"]))
+            reference = None
+            if row["reference_count"] is not None:
+                reference = footprints_of(
+                    [shape["wkb"] for shape in shapes],
+                    crs=row["crs"],
+                    ids=[shape["id"] for shape in shapes],
+                    building_ids=None if row["building_ids"] is None else json.loads(row["building_ids"]),
+                    source=row["name"],
+                )
+            return StoredScene(
+                id=scene_id,
+                key=row["key"],
+                name=row["name"],
+                recipe=recipe,
+                content_hash=row["content_hash"],
                 crs=row["crs"],
-                ids=[shape["id"] for shape in shapes],
-                building_ids=None if row["building_ids"] is None else json.loads(row["building_ids"]),
-                source=row["name"],
+                extent=None if row["extent"] is None else tuple(json.loads(row["extent"])),
+                grid=None if row["grid"] is None else Grid(*json.loads(row["grid"])),
+                area=None if row["area"] is None else shapely.from_wkb(row["area"]),
+                reference=reference,
+                facts=json.loads(row["facts"] or "{}"),
+                point_count=row["point_count"],
             )
-        return StoredScene(
-            id=scene_id,
-            key=row["key"],
-            name=row["name"],
-            recipe=recipe,
-            content_hash=row["content_hash"],
-            crs=row["crs"],
-            extent=None if row["extent"] is None else tuple(json.loads(row["extent"])),
-            grid=None if row["grid"] is None else Grid(*json.loads(row["grid"])),
-            area=None if row["area"] is None else shapely.from_wkb(row["area"]),
-            reference=reference,
-            facts=json.loads(row["facts"] or "{}"),
-            point_count=row["point_count"],
-        )
 
     def scene_sizes(self) -> dict[int, tuple[int | None, float]]:
         """Return the number of points (None where not known) and the hectares of every scene that was opened."""
         rows = self._db.execute("SELECT id, point_count, extent FROM scenes WHERE extent IS NOT NULL")
         sizes = {}
         for row in rows:
-            xmin, ymin, xmax, ymax = json.loads(row["extent"])
-            sizes[int(row["id"])] = (row["point_count"], (xmax - xmin) * (ymax - ymin) / 1e4)
+            with decoding(f"{self.path}: the extent of scene {row['id']}"):
+                xmin, ymin, xmax, ymax = json.loads(row["extent"])
+                sizes[int(row["id"])] = (row["point_count"], (xmax - xmin) * (ymax - ymin) / 1e4)
         return sizes
 
     def scene_hashes(self) -> dict[int, str | None]:
@@ -199,12 +207,13 @@ class StoreReader:
             "SELECT label, attributes, crs FROM runs JOIN scenes ON scenes.id = scene_id WHERE runs.id = ?", (run_id,)
         ).fetchone()
         shapes = self._db.execute("SELECT id, wkb FROM detections WHERE run_id = ? ORDER BY id", (run_id,)).fetchall()
-        return footprints_of(
-            [shape["wkb"] for shape in shapes],
-            crs=row["crs"],
-            attributes=json.loads(row["attributes"]),
-            source=f"run {run_id} ({row['label']})",
-        )
+        with decoding(f"{self.path}: the detections of run {run_id}"):
+            return footprints_of(
+                [shape["wkb"] for shape in shapes],
+                crs=row["crs"],
+                attributes=json.loads(row["attributes"]),
+                source=f"run {run_id} ({row['label']})",
+            )
 
     def evaluation(self, run_id: int, evaluator: Evaluator, key: str) -> Evaluation | None:
         """Return the stored evaluation of a run, rebuilt from its tallies; None when it was not evaluated."""
@@ -217,8 +226,10 @@ class StoreReader:
         query = "SELECT run_id, tallies, notes FROM evaluations WHERE key = ?"
         for row in self._db.execute(query, (key,)):
             if row["run_id"] in wanted:
-                tallies = evaluator.tallies_type.from_dict(json.loads(row["tallies"]))
-                found[int(row["run_id"])] = evaluator.summarise(tallies, json.loads(row["notes"]))
+                with decoding(f"{self.path}: the evaluation of run {row['run_id']}"):
+                    tallies = evaluator.tallies_type.from_dict(json.loads(row["tallies"]))
+                    notes = json.loads(row["notes"])
+                found[int(row["run_id"])] = evaluator.summarise(tallies, notes)
         return found
 
     def index_values(self, run_ids: Iterable[int], key: str) -> dict[int, dict[str, float | None]]:
@@ -242,13 +253,25 @@ class StoreReader:
     def evaluators(self) -> list[tuple[str, PluginRecipe]]:
         """Return the key and recipe of every evaluator that has evaluated a run."""
         rows = self._db.execute("SELECT key, evaluator, parameters FROM evaluations GROUP BY key ORDER BY MIN(id)")
-        return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
+        return [
+            (
+                row["key"],
+                PluginRecipe(row["evaluator"], self._json(row["parameters"], "the parameters of an evaluator")),
+            )
+            for row in rows
+        ]
 
     def evaluators_of(self, run_id: int) -> list[tuple[str, PluginRecipe]]:
         """Return the key and recipe of every evaluator that has evaluated this run."""
         query = "SELECT key, evaluator, parameters FROM evaluations WHERE run_id = ? ORDER BY id"
         rows = self._db.execute(query, (run_id,))
-        return [(row["key"], PluginRecipe(row["evaluator"], json.loads(row["parameters"]))) for row in rows]
+        return [
+            (
+                row["key"],
+                PluginRecipe(row["evaluator"], self._json(row["parameters"], "the parameters of an evaluator")),
+            )
+            for row in rows
+        ]
 
     def count_runs(self) -> int:
         """Return how many runs are stored."""
@@ -258,19 +281,20 @@ class StoreReader:
         """Return the source closure that a run was made with."""
         query = "SELECT modules, packages FROM codes JOIN runs ON code_id = codes.id WHERE runs.id = ?"
         row = self._db.execute(query, (run_id,)).fetchone()
-        return SourceClosure(json.loads(row["modules"]), json.loads(row["packages"]))
+        what = f"the code of run {run_id}"
+        return SourceClosure(self._json(row["modules"], what), self._json(row["packages"], what))
 
     def machine(self, run_id: int) -> Mapping[str, Any]:
         """Return where a run was done."""
         query = "SELECT facts FROM machines JOIN runs ON machine_id = machines.id WHERE runs.id = ?"
         row = self._db.execute(query, (run_id,)).fetchone()
-        facts: Mapping[str, Any] = json.loads(row["facts"]) if row is not None else {}
+        facts: Mapping[str, Any] = self._json(row["facts"], f"the machine of run {run_id}") if row is not None else {}
         return facts
 
     def metadata(self, run_id: int) -> Mapping[str, Any]:
         """Return the facts that the detector gave of its result as a whole."""
         row = self._db.execute("SELECT metadata FROM runs WHERE id = ?", (run_id,)).fetchone()
-        facts: Mapping[str, Any] = json.loads(row["metadata"])
+        facts: Mapping[str, Any] = self._json(row["metadata"], f"the facts of run {run_id}")
         return facts
 
     def run_notes(self, run_ids: Iterable[int]) -> dict[int, tuple[str, ...]]:
@@ -279,7 +303,7 @@ class StoreReader:
         query = """SELECT id, json_extract(metadata, '$.notes') AS notes FROM runs
             WHERE metadata LIKE '%"notes"%' AND json_type(metadata, '$.notes') = 'array'"""
         rows = self._db.execute(query)
-        return {int(row["id"]): tuple(json.loads(row["notes"])) for row in rows if row["id"] in wanted}
+        return {int(row["id"]): tuple(self._json(row["notes"], "notes")) for row in rows if row["id"] in wanted}
 
 
 def _chunks(items: list[str], size: int = 500) -> Iterator[list[str]]:

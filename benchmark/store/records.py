@@ -19,6 +19,7 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ..identity.keys import SourceClosure
 from ..identity.recipes import PluginRecipe, SceneRecipe
+from .cells import decoding, json_of
 from .outcomes import Status
 
 __all__ = ["RunIdentity", "RunRow", "StoredScene", "evaluation_key"]
@@ -105,13 +106,14 @@ class RunRow(NamedTuple):
     @property
     def parameters(self) -> Mapping[str, Any]:
         """Every parameter of the detector, defaults included."""
-        values: Mapping[str, Any] = json.loads(self.parameters_text)
+        values: Mapping[str, Any] = json_of(self.parameters_text, f"the stored run {self.id}")
         return values
 
     @property
     def recipe(self) -> SceneRecipe:
         """The recipe of its scene."""
-        return SceneRecipe.from_dict(json.loads(self.recipe_text))
+        with decoding(f"the stored scene of run {self.id}"):
+            return SceneRecipe.from_dict(json.loads(self.recipe_text))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -194,7 +194,10 @@ def _ogr_parts(file: Path, layer: str | None) -> tuple[str | None, str | None, i
     import pyogrio.raw
 
     with readable_layer(file, layer) as (path, name), quiet():
-        count = int(pyogrio.read_info(path, layer=name, force_feature_count=True)["features"])
+        try:
+            count = int(pyogrio.read_info(path, layer=name, force_feature_count=True)["features"])
+        except UnboundLocalError as error:  # see ogr_layers
+            raise InputError(f"{file}: its CRS cannot be read: set it with ogr2ogr -a_srs EPSG:...") from error
         with pyogrio.raw.open_arrow(path, layer=name, use_pyarrow=True) as (meta, reader):
             schema = reader.schema
     geometry = meta["geometry_name"] or "wkb_geometry"

@@ -30,7 +30,7 @@ from ...core.errors import InputError, OutputError
 from ...core.inputs import require_file
 from .crs import parse_crs
 from .las_headers import HEADER_BYTES, header_crs, refuse_cut_off, refuse_pointwise, refuse_record_counts
-from .point_chunks import chunks_of_file, fits, met_points
+from .point_chunks import chunks_of_file, fits, met_points, refuse_broken_chunks
 from .points import PointCloud
 
 __all__ = ["LasHeader", "read_chunks", "read_las_header", "read_points", "write_points"]
@@ -99,7 +99,6 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None, fal
     with _opened(file) as reader:
         header = reader.header
         refuse_cut_off(file, header)
-        refuse_pointwise(file, header)
         scaling = np.concatenate([header.scales, header.offsets])
         if not np.isfinite(scaling).all() or (header.scales == 0).any():
             raise InputError(
@@ -312,6 +311,8 @@ def _opened(file: Path) -> Iterator[Any]:
         # Not laszip, which laspy would take where it is installed: the same decompressor reads everywhere.
         backends = (laspy.LazBackend.LazrsParallel, laspy.LazBackend.Lazrs)
         with laspy.open(file, laz_backend=backends) as reader:
+            refuse_pointwise(file, reader.header)
+            refuse_broken_chunks(file, reader.header)
             yield reader
     except InputError:
         raise

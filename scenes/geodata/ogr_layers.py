@@ -80,6 +80,10 @@ def _read(path: Path, name: str) -> Layer:
             if source is not path:
                 raise
             source = _virtual(path, name)
+        except UnboundLocalError:  # pyogrio fails on a CRS that PROJ reads and cannot write as WKT
+            if source is not path:
+                raise
+            source = _virtual(path, name, with_crs=False)
         except UnicodeDecodeError:
             if encoding is not None:
                 raise
@@ -124,18 +128,19 @@ def _decoded(value: Any) -> Any:
         return value
 
 
-def _virtual(path: Path, name: str, kinds: Mapping[str, str] | None = None) -> bytes:
+def _virtual(path: Path, name: str, kinds: Mapping[str, str] | None = None, *, with_crs: bool = True) -> bytes:
     """Return a virtual layer of OGR that is `name` of a file, with its geometry type left open.
 
     With `kinds`, the numpy types of the columns by name, dates are texts.
     """
+    crs = "" if with_crs else "<LayerSRS>NULL</LayerSRS>"
     fields = "".join(
         f'<Field name={quoteattr(label)} src={quoteattr(label)} type="{_TYPES.get(kind, "String")}"/>'
         for label, kind in (kinds or {}).items()
     )
     return (
         f"<OGRVRTDataSource><OGRVRTLayer name={quoteattr(name)}><SrcDataSource>{escape(str(path.absolute()))}"
-        f"</SrcDataSource><SrcLayer>{escape(name)}</SrcLayer><GeometryType>wkbUnknown</GeometryType>{fields}"
+        f"</SrcDataSource><SrcLayer>{escape(name)}</SrcLayer><GeometryType>wkbUnknown</GeometryType>{crs}{fields}"
         "</OGRVRTLayer></OGRVRTDataSource>"
     ).encode()
 

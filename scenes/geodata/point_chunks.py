@@ -25,9 +25,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import InputError
 from ...core.output import whole_file
 
-__all__ = ["CHUNK_INDEX", "chunk_size", "chunks_of_file", "fits", "met_points", "read_chunk_index", "write_chunk_index"]
+__all__ = [
+    "CHUNK_INDEX",
+    "chunk_size",
+    "chunks_of_file",
+    "fits",
+    "met_points",
+    "read_chunk_index",
+    "refuse_broken_chunks",
+    "write_chunk_index",
+]
 
 CHUNK_INDEX = "chunks.npz"
 #: Points of a chunk of an uncompressed file.
@@ -46,6 +56,48 @@ def chunk_size(header: Any) -> int | None:
         table = LazVlr(record.record_data_bytes())
         return None if table.uses_variable_size_chunks() else int(table.chunk_size())
     return None
+
+
+def refuse_broken_chunks(file: Path, header: Any) -> None:
+    """Refuse a LAZ file whose table of chunks cannot be that of its points.
+
+    The decompressor reserves memory for what the table announces, and ends the process where there is none.
+
+    Raises
+    ------
+    InputError
+        The table lies outside the file, or its chunks need more bytes than the file has.
+    lazrs.LazrsError, OSError
+        The table cannot be read.
+    """
+    if not header.are_points_compressed or not header.point_count:
+        return
+    from lazrs import LazVlr, read_chunk_table
+
+    size, start = file.stat().st_size, header.offset_to_point_data
+    with file.open("rb") as stream:
+        stream.seek(start)
+        place = int.from_bytes(stream.read(8), "little", signed=True)
+        if place == -1:  # written by a program that could not go back: the offset is at the end
+            stream.seek(size - 8)
+            place = int.from_bytes(stream.read(8), "little", signed=True)
+        if not start + 8 <= place <= size - 8:
+            raise _broken_chunks(file, "its table of chunks lies outside the file")
+        stream.seek(place + 4)
+        count = int.from_bytes(stream.read(4), "little")
+        # A chunk begins with a point that is not compressed; some programs write one chunk without points at the end.
+        if (count - 1) * header.point_format.size > size:
+            raise _broken_chunks(file, f"its table announces {count} chunks in {size} bytes")
+        for record in header.vlrs.get("LasZipVlr"):
+            stream.seek(start)
+            table = read_chunk_table(stream, LazVlr(record.record_data_bytes()))
+            needed = sum(length for _, length in table)
+            if needed > place - start:
+                raise _broken_chunks(file, f"its chunks need {needed} bytes, there are {place - start}")
+
+
+def _broken_chunks(file: Path, reason: str) -> InputError:
+    return InputError(f"{file} is truncated or broken ({reason}): copy or download it again")
 
 
 def chunks_of_file(reader: Any) -> NDArray[np.float64] | None:

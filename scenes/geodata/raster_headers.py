@@ -29,6 +29,8 @@ _OTHER_COLOURS = {"hue", "saturation", "lightness", "cyan", "magenta", "yellow",
 _METRES = re.compile(r"\W*(m|met(er|re)s?|masl)(?![\w*/^])", re.IGNORECASE)
 #: Words that name no unit.
 _NO_UNIT = ("", "unknown", "none", "undefined", "n/a", "-")
+#: Largest coordinate and smallest pixel of an image, in its unit; beyond them a header is broken.
+_LARGEST, _SMALLEST = 1e9, 1e-9
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,12 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
                 "world file (.tfw) beside it"
             )
         a, b, c, d, e, f = tuple(source.transform)[:6]
+        ends = (c, f, c + a * source.width, f + e * source.height)
+        if not all(abs(number) <= _LARGEST for number in (b, d, *ends)) or not min(abs(a), abs(e)) >= _SMALLEST:
+            raise InputError(
+                f"{file} is broken: its affine transform ({a:g}, {b:g}, {c:g}, {d:g}, {e:g}, {f:g}) is that of no "
+                "image; copy or download it again, or set its corners with gdal_edit.py -a_ullr"
+            )
         if abs(b) > 1e-9 * abs(a) or abs(d) > 1e-9 * abs(e) or a <= 0 or e >= 0:
             raise InputError(
                 f"{file} is rotated or not north up (affine transform {a:g}, {b:g}, {d:g}, {e:g}): make it north up, "

@@ -24,12 +24,16 @@ __all__ = ["SAMPLES", "Sample", "make_files"]
 
 @dataclass(frozen=True)
 class Sample:
-    """A file to damage, the files beside it, and the arguments of the command that reads it."""
+    """A file to damage, the files beside it, and the arguments of the command that reads it.
+
+    A command that `checks` prints what it found, all problems included.
+    """
 
     damaged: str
     beside: tuple[str, ...]
     arguments: tuple[str, ...]
     output: str | None = None
+    checks: bool = False
 
 
 _EVALUATE = ("evaluate", "--format", "json")
@@ -63,7 +67,7 @@ SAMPLES: dict[str, Sample] = {
     "copc": _imported("points.copc.laz", "points.copc.laz", "--dem", "dem.tif", beside=("dem.tif",)),
     "orthoimage": _imported("ortho.tif", "ortho.tif"),
     "elevation": _imported("dem.tif", "ortho.tif", "--dem", "dem.tif", beside=("ortho.tif",)),
-    "manifest": Sample("scene/scene.toml", ("scene",), ("scenes", "check", "scene")),
+    "manifest": Sample("scene/scene.toml", ("scene",), ("scenes", "check", "scene"), checks=True),
     "suite": Sample("suite.toml", (), ("run", "suite.toml", "--dry-run", "--store", "new.sqlite"), "new.sqlite"),
     "store-ls": Sample("runs.sqlite", (), ("ls", "--format", "json", "--store", "runs.sqlite")),
     "store-report": Sample("runs.sqlite", (), ("report", "runs.sqlite", "-q", "-o", "out.html"), "out.html"),

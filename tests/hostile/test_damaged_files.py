@@ -44,7 +44,8 @@ def test_damaged_files_end_in_one_sentence(name, number, sound_files, sandbox, t
     damaged = tmp_path / sample.damaged
     damaged.write_bytes(mutate(damaged.read_bytes(), rng))
     before = content(tmp_path)
-    check(sandbox.run(*sample.arguments, folder=tmp_path), before, tmp_path, sample.output)
+    outcome = sandbox.run(*sample.arguments, folder=tmp_path)
+    check(outcome, before, tmp_path, sample.output, checks=sample.checks)
 
 
 @pytest.mark.parametrize("mutation", MUTATIONS, ids=lambda mutation: mutation.__name__)

@@ -6,6 +6,27 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
+#: Coordinates are rounded to this grid before areas are computed, m. Without it GEOS 3.14 (floating precision) loses or
+#: keeps whole faces of near-coincident edges in one of some thousand sets.
+GRID = 1e-10
+
+
+def faces(geometry):
+    """Return the polygons of a geometry, without the lines and points where outlines only touch."""
+    return shapely.MultiPolygon([part for part in shapely.get_parts(geometry) if part.geom_type == "Polygon"])
+
+
+def intersection(one, two):
+    return faces(shapely.intersection(one, two, grid_size=GRID))
+
+
+def difference(one, two):
+    return faces(shapely.difference(one, two, grid_size=GRID))
+
+
+def union(polygons):
+    return faces(shapely.union_all(polygons, grid_size=GRID))
+
 
 def centre(polygon):
     corners = list(polygon.exterior.coords)[:-1] if polygon.geom_type == "Polygon" else []
@@ -19,7 +40,7 @@ def centre(polygon):
 
 
 def overlap(one, two):
-    area = one.intersection(two).area
+    area = intersection(one, two).area
     return area if area > 1e-6 * min(one.area, two.area) else 0.0
 
 
@@ -90,12 +111,12 @@ def evaluate(detected, reference, building=None, *, matching="nearest", area=Non
 
     def clip(polygon):
         # An empty buffer leaves out the lines and points where the polygon only touches the area.
-        return polygon if area is None else polygon.intersection(area).buffer(0)
+        return polygon if area is None else intersection(polygon, area).buffer(0)
 
     pairs = [(clip(detected[d]), clip(reference[r])) for d, r in matches.items()]
-    true = shapely.union_all([one.intersection(two) for one, two in pairs])
-    commission = [one.difference(two) for one, two in pairs] + [clip(detected[d]) for d in false_positive]
-    omission = [two.difference(one) for one, two in pairs] + [clip(reference[r]) for r in false_negative]
+    true = union([intersection(one, two) for one, two in pairs])
+    commission = [difference(one, two) for one, two in pairs] + [clip(detected[d]) for d in false_positive]
+    omission = [difference(two, one) for one, two in pairs] + [clip(reference[r]) for r in false_negative]
     return {
         "counts.detected": len(counted_d),
         "counts.reference": len(counted_r),
@@ -107,14 +128,14 @@ def evaluate(detected, reference, building=None, *, matching="nearest", area=Non
         "counts.cross_lapping_detections": cross_lapping,
         "counts.cross_lapped_references": cross_lapped,
         "areas.true_positive": true.area,
-        "areas.false_positive": shapely.union_all(commission).difference(true).area,
-        "areas.false_negative": shapely.union_all(omission).difference(true).area,
+        "areas.false_positive": difference(union(commission), true).area,
+        "areas.false_negative": difference(union(omission), true).area,
         **literal_areas(
             matches, building, lambda d: clip(detected[d]), lambda r: clip(reference[r]), false_positive, false_negative
         ),
         "areas.pair_detected": sum(one.area for one, _ in pairs),
         "areas.pair_reference": sum(two.area for _, two in pairs),
-        "areas.pair_shared": sum(one.intersection(two).area for one, two in pairs),
+        "areas.pair_shared": sum(intersection(one, two).area for one, two in pairs),
         "geometric.sum_squared": sum(outline_distance(detected[d], reference[r]) ** 2 for d, r in matches.items()),
         "geometric.sum_polis": sum(polis(detected[d], reference[r]) for d, r in matches.items()),
     }
@@ -127,10 +148,10 @@ def literal_areas(matches, building, one_of, two_of, false_positive, false_negat
     for label in dict.fromkeys(building):
         own = [(one_of(d), two_of(r)) for d, r in matches.items() if building[r] == label]
         missed = [two_of(r) for r in false_negative if building[r] == label]
-        found = shapely.union_all([one.intersection(two) for one, two in own])
+        found = union([intersection(one, two) for one, two in own])
         true += found.area
-        commission += shapely.union_all([one for one, _ in own]).difference(found).area
-        omission += shapely.union_all([*(two for _, two in own), *missed]).difference(found).area
+        commission += difference(union([one for one, _ in own]), found).area
+        omission += difference(union([*(two for _, two in own), *missed]), found).area
     return {
         "literal_areas.true_positive": true,
         "literal_areas.false_positive": commission,

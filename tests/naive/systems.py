@@ -6,13 +6,13 @@ import math
 
 import shapely
 
-from naive.evaluation import overlap
+from naive.evaluation import difference, intersection, overlap, union
 
 
 def covered_share(polygon, others):
     """Return which share of a polygon lies inside any of the others that overlap it."""
-    inside = [polygon.intersection(other) for other in others if overlap(polygon, other)]
-    return shapely.union_all(inside).area / polygon.area if inside else 0.0
+    inside = [intersection(polygon, other) for other in others if overlap(polygon, other)]
+    return union(inside).area / polygon.area if inside else 0.0
 
 
 def touched(polygon, others):
@@ -77,8 +77,8 @@ def hausdorff(one, two):
 
 
 def band_iou(one, two, width):
-    bands = [polygon.difference(polygon.buffer(-width)) for polygon in (one, two)]
-    shared = bands[0].intersection(bands[1]).area
+    bands = [difference(polygon, polygon.buffer(-width)) for polygon in (one, two)]
+    shared = intersection(*bands).area
     return shared / (bands[0].area + bands[1].area - shared)
 
 

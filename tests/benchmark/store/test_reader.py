@@ -209,3 +209,25 @@ def test_notes_of_runs_and_no_others(store):
     second = store.record(identity("other"), other, version="1")
     assert store.run_notes([1, 2, 3, first, second]) == {first: ("no DEM",)}
     assert store.run_notes([1]) == {}
+
+
+@pytest.mark.parametrize(
+    ("damage", "read"),
+    [
+        ("UPDATE scene_references SET wkb = x'0103'", lambda store: store.scene(1)),
+        ("UPDATE scenes SET grid = '[1, 2,'", lambda store: store.scene(1)),
+        ("UPDATE scenes SET grid = '[1, 2]'", lambda store: store.scene(1)),
+        ("UPDATE scenes SET area = x'00'", lambda store: store.scene(1)),
+        ("UPDATE scenes SET recipe = '[]'", lambda store: store.runs()[0].recipe),
+        ("UPDATE scenes SET extent = '[]'", lambda store: store.scene_sizes()),
+        ("UPDATE runs SET parameters = '{'", lambda store: store.runs()[0].parameters),
+        ("UPDATE detections SET wkb = x'01'", lambda store: store.detections(1)),
+        ("UPDATE evaluations SET tallies = '{'", lambda store: store.evaluation(1, KEYED.evaluator, KEYED.key)),
+        ("UPDATE evaluations SET parameters = ''", lambda store: store.evaluators_of(1)),
+        ("UPDATE codes SET modules = '{'", lambda store: store.code(1)),
+    ],
+)
+def test_a_damaged_cell_is_named_in_one_sentence(store, damage, read):
+    store._db.execute(damage)
+    with pytest.raises(InputError, match="damaged"):
+        read(store)

@@ -152,6 +152,21 @@ def test_a_file_that_is_no_store_or_a_newer_one_is_refused(tmp_path):
         Store(tmp_path / "absent.sqlite", must_exist=True)
 
 
+@pytest.mark.parametrize("size", [0, 1, 99])
+def test_an_empty_file_is_no_store_and_is_not_filled(tmp_path, size):
+    path = tmp_path / "cut.sqlite"
+    path.write_bytes(bytes(size))
+    with pytest.raises(InputError, match=rf"empty or cut off \({size} bytes\)"):
+        Store(path, must_exist=True)
+    assert path.read_bytes() == bytes(size)
+
+
+def test_a_store_may_be_made_in_an_empty_file_as_mktemp_leaves_it(tmp_path):
+    (tmp_path / "new.sqlite").touch()
+    with Store(tmp_path / "new.sqlite") as store:
+        assert store.count_runs() == 0
+
+
 def test_a_store_of_version_0_1_shows_its_scores_and_scores_its_detections_again(tmp_path):
     path = tmp_path / "old.sqlite"
     shutil.copy(DATA / "store-0.1.db", path)

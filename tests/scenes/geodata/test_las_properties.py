@@ -182,3 +182,17 @@ def test_a_record_that_cannot_be_of_the_coordinates_is_replaced_by_the_crs_that_
     with pytest.raises(CRSError, match=r"name the (true )?CRS by crs="):
         read_las_header(file)
     assert read_las_header(file, fallback="EPSG:25832").crs == "EPSG:25832"
+
+
+def test_a_table_of_chunks_that_needs_more_than_the_file_is_refused_before_memory_is_reserved(tmp_path):
+    path = write(tmp_path / "points.laz")
+    content = bytearray(path.read_bytes())
+    with laspy.open(path) as reader:
+        start = reader.header.offset_to_point_data
+    place = int.from_bytes(content[start : start + 8], "little")
+    many = content[: place + 4] + (2**31).to_bytes(4, "little") + content[place + 8 :]
+    outside = content[:start] + (2**40).to_bytes(8, "little") + content[start + 8 :]
+    for damaged, reason in ((many, "2147483648 chunks"), (outside, "outside the file")):
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=reason):
+            read_points(path)

@@ -162,3 +162,19 @@ def test_a_mask_in_the_alpha_band_does_not_look_like_values(tmp_path):
         target.write(values)
         target.colorinterp = [ColorInterp.red, ColorInterp.green, ColorInterp.blue, ColorInterp.alpha]
     assert not looks_like_values(read_raster_header(tmp_path / "rgba.tif"))
+
+
+@pytest.mark.parametrize(
+    "transform",
+    [
+        (1, 0, WEST, 0, -1, np.nan),
+        (1, 0, 1e300, 0, -1, SOUTH),
+        (1, np.nan, WEST, 0, -1, SOUTH),
+        (1, 0, 0, 0, -1e-30, 0),
+    ],
+)
+def test_a_transform_that_is_that_of_no_image_is_refused(tmp_path, transform):
+    with write(tmp_path / "dem.tif", np.zeros((1, 4, 4), np.float32), transform=Affine(*transform)):
+        pass
+    with pytest.raises(InputError, match="affine transform"):
+        read_raster_header(tmp_path / "dem.tif")
