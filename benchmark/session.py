@@ -16,7 +16,8 @@ from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
 from .analysis.leaderboard import make_leaderboard
 from .analysis.results import Leaderboard
-from .execution.runner import Execution, run_plan
+from .execution.executors import Execution
+from .execution.runner import run_plan
 from .execution.worker import detect as _detect
 from .identity.recipes import SceneRecipe
 from .plan import Rerun, make_plan

@@ -33,7 +33,7 @@ from .options import (
 from .usage_errors import UsageError
 
 if TYPE_CHECKING:
-    from ..benchmark.execution.runner import Execution
+    from ..benchmark.execution.executors import Execution
 
 __all__ = ["Command", "RunOptions", "load_plugins", "option_names", "with_run_options"]
 
@@ -177,7 +177,7 @@ class RunOptions:
 
     def execution(self) -> Execution:
         """Return how runs are executed."""
-        from ..benchmark.execution.runner import Execution
+        from ..benchmark.execution.executors import Execution
         from ..core.processes import Limits
 
         if self.jobs == 0 and (self.time_limit is not None or self.memory_limit is not None):

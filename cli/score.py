@@ -106,7 +106,8 @@ def _contributed(store: Store, suite: Suite, folder: Path, label: str) -> tuple[
     """Run the footprints of a folder; return the other stored rows of the same scenes, and theirs."""
     from ..benchmark.analysis.report_contents import newest_runs
     from ..benchmark.contribution import contribution_suite
-    from ..benchmark.execution.runner import Execution, run_plan
+    from ..benchmark.execution.executors import Execution
+    from ..benchmark.execution.runner import run_plan
     from ..benchmark.plan import make_plan, plan_content
     from .progress import run_progress
 

@@ -43,6 +43,7 @@ __all__ = [
     "MANIFEST",
     "SCENE_FILES",
     "changed_files",
+    "listed_hash",
     "open_scene",
     "read_manifest",
     "save_scene",
@@ -179,12 +180,12 @@ def read_manifest(path: str | os.PathLike[str]) -> tuple[Path, dict[str, Any]]:
     return folder, manifest
 
 
-def changed_files(path: str | os.PathLike[str]) -> list[str]:
-    """Return the names of the files whose SHA-256 is not the one in the manifest."""
+def changed_files(path: str | os.PathLike[str], *, tiles: bool = True) -> list[str]:
+    """Return the names of the files whose SHA-256 is not the one in the manifest; `tiles`: of tile files, too."""
     folder, manifest = read_manifest(path)
     files: dict[str, Mapping[str, Any]] = manifest.get("files", {})
     listed = {FILES[kind]: entry["sha256"] for kind, entry in files.items()}
-    listed |= {entry["file"]: entry["sha256"] for entry in manifest.get("tiles", ())}
+    listed |= {entry["file"]: entry["sha256"] for entry in manifest.get("tiles", ()) if tiles}
     return [
         name for name, digest in listed.items() if not (folder / name).is_file() or checksum(folder / name) != digest
     ]
@@ -352,9 +353,15 @@ def _toml_content(value: Any) -> Any:
     return plain_value(value)
 
 
-def _content_hash(folder: Path, manifest: Mapping[str, Any]) -> str:
+def listed_hash(path: str | os.PathLike[str]) -> str:
+    """Return the content hash of a scene without reading its tile files, which are checked when a window meets them."""
+    folder, manifest = read_manifest(path)
+    return _content_hash(folder, manifest, tiles=False)
+
+
+def _content_hash(folder: Path, manifest: Mapping[str, Any], *, tiles: bool = True) -> str:
     """Return the digest of the manifest's digests, after checking that the files are still those."""
-    changed = changed_files(folder)
+    changed = changed_files(folder, tiles=tiles)
     if changed:
         raise InputError(
             f"{folder}: {', '.join(changed)} changed since {MANIFEST} was written: if that is intended, run "

@@ -23,7 +23,8 @@ from ...core.registry import nearest_hint, parse_assignment
 from ...detectors.base import Detector
 from ...evaluators.base import Index
 from ...scenes.scene import Scene
-from ..execution.runner import Execution, run_plan
+from ..execution.executors import Execution
+from ..execution.runner import run_plan
 from ..identity.recipes import SceneRecipe
 from ..plan import KeyedEvaluator, Plan, PlannedRun, Rerun, make_plan
 from ..store.outcomes import Outcome

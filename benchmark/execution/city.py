@@ -10,36 +10,31 @@ work folder
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
-
-import numpy as np
-import shapely
 
 from ...core.digests import digest
 from ...core.errors import OutputError, ParameterError
 from ...core.output import check_target, whole_file
 from ...detectors.base import Detector
-from ...detectors.tiling import Measured, Seams, Tile, join_tiles, measure, tiles_over
-from ...scenes.geodata.footprints import Footprints
+from ...detectors.tiling import Measured, Seams, Tile, measure, tiles_over
 from ...scenes.geodata.vector_files import output_driver, write_footprints
 from ...scenes.scene import Scene
 from ..identity.keys import module_closure
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
 from ..store.outcomes import Outcome
-from .executors import slots_of
+from .executors import Execution, slots_of
 from .isolation import call_isolated
-from .runner import Execution
 from .tasks import Task, TilePart
+from .tile_outcomes import join_outcomes
 from .worker import execute_text
 
-__all__ = ["City", "CityResult", "detect_city"]
+__all__ = ["City", "CityResult", "TileWork", "detect_city", "plan_tiles", "remove_tiles", "run_tiles", "work_key"]
 
 _MEASURED = "measured.json"
 
@@ -104,6 +99,25 @@ class _Job(NamedTuple):
     file: Path
 
 
+class TileWork(NamedTuple):
+    """What is to be done for a city.
+
+    Attributes
+    ----------
+    scene : Scene
+    folder : Path
+        Work folder.
+    measured : Measured
+    jobs : tuple
+        Tile, task and file of the outcome of each tile.
+    """
+
+    scene: Scene
+    folder: Path
+    measured: Measured
+    jobs: tuple[_Job, ...]
+
+
 def detect_city(
     recipe: SceneRecipe,
     detector: Detector,
@@ -136,15 +150,45 @@ def detect_city(
     check_target(output, overwrite)
     output_driver(output)
     execution = execution or Execution()
+    work = plan_tiles(recipe, detector, output.with_name(f"{output.name}.tiles"), city, order=order)
+    waiting = [job for job in work.jobs if not job.file.exists()]
+    failed = run_tiles(work, execution, progress)
+    files = {job.tile: job.file for job in work.jobs if job.tile not in failed}
+    joined = join_outcomes(files, detector, work.scene.crs)
+    write_footprints(joined.footprints, output, overwrite=overwrite)
+    left_out = tuple(work.scene.facts.get("left_out", ()))
+    if not failed and not left_out:
+        remove_tiles(work.folder)
+    return CityResult(
+        footprints=len(joined.footprints),
+        tiles=len(work.jobs),
+        reused=len(work.jobs) - len(waiting),
+        seams=joined.seams,
+        failed=dict(sorted(failed.items())),
+        skipped=joined.skipped,
+        left_out=left_out,
+        measured=work.measured,
+        peak_memory=joined.cost.peak_memory,
+    )
+
+
+def plan_tiles(
+    recipe: SceneRecipe,
+    detector: Detector,
+    folder: Path,
+    city: City,
+    *,
+    order: Callable[[Sequence[Tile]], Sequence[Tile]] | None = None,
+) -> TileWork:
+    """Return the tasks of all tiles, and measure what they share; the folder is made."""
     scene = recipe.open()
     halo = detector.halo if city.halo is None else city.halo
     tiles = tiles_over(scene.extent, city.tile)
-    folder = output.with_name(f"{output.name}.tiles")
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder} cannot be made: {error.strerror}") from error
-    base = digest([_code_of(detector), detector.name, detector.values(), recipe.name, city.tile, halo])
+    base = work_key(recipe, detector, city)
     measured = _measured(folder / _MEASURED, base, scene, detector, tiles)
     fixed = detector.replaced(measured.parameters)
     jobs = []
@@ -155,26 +199,13 @@ def detect_city(
         part = TilePart(tile=tile, halo=halo, measured=measured)
         task = Task(scene=recipe, detector=PluginRecipe.of(fixed), seed=city.seed, evaluators=(), part=part)
         jobs.append(_Job(tile, task, folder / f"{tile.column}_{tile.row}.{key[:32]}"))
-    waiting = [job for job in jobs if not job.file.exists()]
-    failed = _run(waiting, execution, progress)
-    outcomes = {job.tile: Outcome.from_bytes(job.file.read_bytes()) for job in jobs if job.tile not in failed}
-    parts = {tile: _footprints(outcome) for tile, outcome in outcomes.items() if outcome.status == "ok"}
-    found, seams = join_tiles(parts, crs=scene.crs, numbers=detector.numbers, source=detector.name)
-    write_footprints(found, output, overwrite=overwrite)
-    left_out = tuple(scene.facts.get("left_out", ()))
-    if not failed and not left_out:
-        _remove(folder)
-    return CityResult(
-        footprints=len(found),
-        tiles=len(tiles),
-        reused=len(jobs) - len(waiting),
-        seams=seams,
-        failed=dict(sorted(failed.items())),
-        skipped={tile: str(done.reason) for tile, done in sorted(outcomes.items()) if done.status == "skipped"},
-        left_out=left_out,
-        measured=measured,
-        peak_memory=max((outcome.cost.peak_memory or 0 for outcome in outcomes.values()), default=0),
-    )
+    return TileWork(scene, folder, measured, tuple(jobs))
+
+
+def work_key(recipe: SceneRecipe, detector: Detector, city: City) -> str:
+    """Return a digest of what the tiles of a city depend on besides seed and files: code, parameters and division."""
+    halo = detector.halo if city.halo is None else city.halo
+    return digest([_code_of(detector), detector.name, detector.values(), recipe.name, city.tile, halo])
 
 
 def _code_of(detector: Detector) -> list[str]:
@@ -194,25 +225,28 @@ def _measured(file: Path, base: str, scene: Scene, detector: Detector, tiles: Se
     return found
 
 
-def _run(
-    jobs: Sequence[_Job], execution: Execution, progress: Callable[[int, int, Tile, Outcome], None] | None
+def run_tiles(
+    work: TileWork, execution: Execution, progress: Callable[[int, int, Tile, Outcome], None] | None = None
 ) -> dict[Tile, str]:
-    """Run the tiles, keep each outcome when it arrives, and return the reasons of those that failed."""
+    """Run the tiles that are not stored, keep each outcome when it arrives, and return the reasons of failed ones."""
     failed: dict[Tile, str] = {}
+    jobs = [job for job in work.jobs if not job.file.exists()]
     if not jobs:
         return failed
     local = execution.jobs == 0 and execution.scheduler is None
     with slots_of(execution.jobs, execution.scheduler, len(jobs)) as slots:
-        waiting = list(reversed(jobs))
+        # Which worker of a cluster gets a task is not known here.
+        queue = _Queue(jobs, ahead=execution.scheduler is None)
         flying: dict[Future[bytes], tuple[_Job, int]] = {}
         turns = range(max(slot.capacity for slot in slots))
         free = [number for turn in turns for number, slot in enumerate(slots) if turn < slot.capacity]
         done = 0
-        while waiting or flying:
-            while waiting and free:
-                job, number = waiting.pop(), free.pop(0)
+        while queue or flying:
+            while queue and free:
+                number = free.pop(0)
+                job, following = queue.next_for(number)
                 submit = slots[number].executor.submit
-                text = job.task.to_json()
+                text = replace(job.task, ahead=following).to_json()
                 future = submit(execute_text, text) if local else submit(call_isolated, text, execution.limits)
                 flying[future] = job, number
             for future in wait(flying, return_when=FIRST_COMPLETED).done:
@@ -227,6 +261,31 @@ def _run(
     return failed
 
 
+class _Queue:
+    """Waiting tiles. Each slot has its next tile reserved, so that a task can name what its worker is to read ahead."""
+
+    def __init__(self, jobs: Sequence[_Job], *, ahead: bool) -> None:
+        self._waiting = list(reversed(jobs))
+        self._ahead = ahead
+        self._reserved: dict[int, _Job] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._waiting or self._reserved)
+
+    def next_for(self, slot: int) -> tuple[_Job, Tile | None]:
+        """Return the next job of a slot, at the end one that is reserved for another slot, and the tile after it."""
+        if slot in self._reserved:
+            job = self._reserved.pop(slot)
+        elif self._waiting:
+            job = self._waiting.pop()
+        else:
+            job = self._reserved.pop(min(self._reserved))
+        if not self._ahead or not self._waiting:
+            return job, None
+        self._reserved[slot] = self._waiting.pop()
+        return job, self._reserved[slot].tile
+
+
 def _keep(job: _Job, future: Future[bytes]) -> Outcome:
     """Write the outcome of a tile into the work folder, unless it failed."""
     try:
@@ -239,14 +298,7 @@ def _keep(job: _Job, future: Future[bytes]) -> Outcome:
     return outcome
 
 
-def _footprints(outcome: Outcome) -> Footprints:
-    polygons = np.empty(len(outcome.detections), dtype=object)
-    polygons[:] = shapely.from_wkb(list(outcome.detections))
-    columns = {name: np.array(column) for name, column in outcome.attributes.items()}
-    return dataclasses.replace(Footprints(polygons=polygons), attributes=columns)
-
-
-def _remove(folder: Path) -> None:
+def remove_tiles(folder: Path) -> None:
     """Remove a work folder; files of others in it stay."""
     for file in folder.iterdir():
         name, _, key = file.name.partition(".")

@@ -13,19 +13,39 @@ import concurrent.futures
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from ...core.errors import InputError, UnsupportedError
+from ...core.processes import Limits
 from .isolation import close_isolated
 
-__all__ = ["InProcess", "Slot", "cluster_slot", "local_slots", "slots_of"]
+__all__ = ["Execution", "InProcess", "Slot", "cluster_slot", "local_slots", "slots_of"]
 
 T = TypeVar("T")
 
 #: Tasks that a slot receives beyond its workers, so that no worker waits for the store.
 _AHEAD = 1
 _CONNECT_SECONDS = 15
+
+
+@dataclass(frozen=True, kw_only=True)
+class Execution:
+    """How runs are executed.
+
+    Attributes
+    ----------
+    jobs : int
+        Worker processes on this machine; 0 runs in this process, without limits and without isolation.
+    scheduler : str, optional
+        Address of a Dask scheduler, used instead of processes on this machine.
+    limits : Limits
+        Of each run.
+    """
+
+    jobs: int = 1
+    scheduler: str | None = None
+    limits: Limits = field(default_factory=Limits)
 
 
 @dataclass(frozen=True, eq=False)

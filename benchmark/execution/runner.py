@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...core.processes import Limits
 from ...scenes.scene import Scene
 from ..identity.provenance import code_version
 from ..identity.recipes import PluginRecipe, SceneRecipe
@@ -18,32 +17,14 @@ from ..plan import KeyedEvaluator, Plan, PlannedRun, scene_recipe
 from ..store.outcomes import Outcome, Score
 from ..store.records import RunRow
 from ..store.writer import Store
+from .city_runs import forget_tiles, is_city_run, run_city
 from .dispatch import Dispatcher
-from .executors import Slot, slots_of
+from .executors import Execution, Slot, slots_of
 from .isolation import call_isolated
 from .tasks import Task
 from .worker import execute, score
 
-__all__ = ["Execution", "RunResult", "run_plan", "score_missing", "score_stored"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Execution:
-    """How runs are executed.
-
-    Attributes
-    ----------
-    jobs : int
-        Worker processes on this machine; 0 runs in this process, without limits and without isolation.
-    scheduler : str, optional
-        Address of a Dask scheduler, used instead of processes on this machine.
-    limits : Limits
-        Of each run.
-    """
-
-    jobs: int = 1
-    scheduler: str | None = None
-    limits: Limits = field(default_factory=Limits)
+__all__ = ["RunResult", "run_plan", "score_missing", "score_stored"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,8 +88,10 @@ def run_plan(
             evaluated += score_stored(store, run.stored, run.missing)
     waiting = [run for run in plan.runs if run.todo == "detect"]
     done = 0
-    for run, outcome in _outcomes(waiting, plan, store, execution):
+    for run, outcome in _every_outcome(waiting, plan, store, execution):
         store.record(run.identity, outcome, version=version, replace=plan.rerun == "always")
+        if is_city_run(run) and outcome.status != "failed":
+            forget_tiles(run, store.path)
         done += 1
         if progress is not None:
             progress(run, outcome)
@@ -150,6 +133,32 @@ def score_stored(store: Store, run_id: int, evaluators: tuple[KeyedEvaluator, ..
     return added
 
 
+def _every_outcome(
+    runs: list[PlannedRun], plan: Plan, store: Store, execution: Execution
+) -> Iterator[tuple[PlannedRun, Outcome]]:
+    """Yield the outcomes of runs on single scenes as they arrive, then those on cities, one after the other."""
+    yield from _outcomes([run for run in runs if not is_city_run(run)], plan, store, execution)
+    evaluators = [keyed.evaluator for keyed in plan.evaluators]
+    for run in runs:
+        if not is_city_run(run) or (plan.rerun != "always" and _is_stored(store, run)):
+            continue
+        if plan.rerun == "always":
+            forget_tiles(run, store.path)
+        task = _task(run, scene_recipe(run.scene), plan, store.described_scenes())
+        yield run, run_city(run, task, evaluators, execution, store.path)
+
+
+def _task(run: PlannedRun, scene: SceneRecipe, plan: Plan, described: Collection[str]) -> Task:
+    return Task(
+        scene=scene,
+        detector=run.identity.detector,
+        seed=run.identity.seed,
+        evaluators=tuple(keyed.recipe for keyed in plan.evaluators),
+        codes=tuple(keyed.code for keyed in plan.evaluators),
+        describe_scene=run.identity.scene_key not in described,
+    )
+
+
 def _outcomes(
     runs: list[PlannedRun], plan: Plan, store: Store, execution: Execution
 ) -> Iterator[tuple[PlannedRun, Outcome]]:
@@ -157,8 +166,6 @@ def _outcomes(
     if not runs:
         return
     described = store.described_scenes()
-    evaluators = tuple(keyed.recipe for keyed in plan.evaluators)
-    codes = tuple(keyed.code for keyed in plan.evaluators)
     with ExitStack() as stack:
         slots = stack.enter_context(slots_of(execution.jobs, execution.scheduler, len(runs)))
         elsewhere = execution.jobs > 0 or execution.scheduler is not None
@@ -169,14 +176,7 @@ def _outcomes(
             while free and (run := dispatcher.next_for(free[0])) is not None:
                 if plan.rerun != "always" and _is_stored(store, run):
                     continue
-                task = Task(
-                    scene=scenes.recipe(run.scene),
-                    detector=run.identity.detector,
-                    seed=run.identity.seed,
-                    evaluators=evaluators,
-                    codes=codes,
-                    describe_scene=run.identity.scene_key not in described,
-                )
+                task = _task(run, scenes.recipe(run.scene), plan, described)
                 slot = free.pop(0)
                 if elsewhere:
                     _must_be_portable(run)

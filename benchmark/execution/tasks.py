@@ -50,6 +50,10 @@ class Task:
         Whether the outcome should describe the scene and its reference, because they are not stored yet.
     part : TilePart, optional
         Detect on a tile instead of the whole scene, and keep what it owns.
+    ahead : Tile, optional
+        What the worker is given next, probably: it reads that window while it computes.
+    tiles : tuple of str
+        Files with the outcomes of all tiles of a city (`tile_outcomes`): they are joined, nothing is detected.
     """
 
     scene: SceneRecipe
@@ -59,6 +63,8 @@ class Task:
     codes: tuple[str, ...] = ()
     describe_scene: bool = False
     part: TilePart | None = None
+    ahead: Tile | None = None
+    tiles: tuple[str, ...] = ()
 
     def to_json(self) -> str:
         """Return the task as text."""
@@ -71,6 +77,8 @@ class Task:
                 "codes": list(self.codes),
                 "describe_scene": self.describe_scene,
                 "part": None if self.part is None else {**asdict(self.part), "measured": self.part.measured._asdict()},
+                "ahead": None if self.ahead is None else asdict(self.ahead),
+                "tiles": list(self.tiles),
             }
         )
 
@@ -87,6 +95,8 @@ class Task:
             codes=tuple(values["codes"]),
             describe_scene=values["describe_scene"],
             part=None if part is None else _part(**part),
+            ahead=None if values["ahead"] is None else Tile(**values["ahead"]),
+            tiles=tuple(values["tiles"]),
         )
 
 

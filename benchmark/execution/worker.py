@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import os
 import platform
+import tempfile
 import time
 import traceback
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,19 +28,26 @@ from ...detectors.external.precomputed import Precomputed
 from ...detectors.streams import random_stream
 from ...detectors.tiling import Tile, join_tiles, measure, owned, stream_of, tiles_over
 from ...evaluators.base import Evaluator
+from ...evaluators.in_parts import ThresholdFree, evaluate_sets
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
 from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure
+from .read_ahead import ReadAhead
 from .scene_picture import scene_picture
 from .tasks import Task, TilePart
+from .tile_outcomes import join_outcomes, tile_of_file
 
-__all__ = ["detect", "execute", "execute_text", "machine_facts", "processor_time", "score"]
+__all__ = ["detect", "execute", "execute_text", "machine_facts", "processor_time", "reason_of", "score"]
 
 #: The scenes opened last; consecutive tasks of a plan often use the same scene.
 _scenes: OrderedDict[str, Scene] = OrderedDict()
 _KEPT_SCENES = 2
+#: The window that is read while another one is computed.
+_ahead = ReadAhead()
+#: Footprints of a set from which on two sets are compared in parts, and those of one part.
+_MANY, _PART = 200_000, 100_000
 
 
 def detect(scene: Scene, detector: Detector, *, seed: int = 0, stream: np.random.Generator | None = None) -> Footprints:
@@ -99,20 +108,24 @@ def execute(
         record = describe(scene, is_city=is_city) if task.describe_scene else None
         whole = scene
         if task.part is not None:
-            scene = _window(scene, task.part)
+            scene = _ahead.take(_window_key(task.scene, task.part)) or _window(scene, task.part)
         if not is_city:
             scene.require(detector.requires)
             scene.for_detection()  # reads all inputs: the time of a detector is that of detection in memory
             if task.part is None:
                 reset_highest_memory()  # that of a tile includes its reading
-        started = _now()
-        if is_city:
+        if task.part is not None and task.ahead is not None:
+            _read_ahead(whole, task.scene, dataclasses.replace(task.part, tile=task.ahead))
+        started, of_tiles = _now(), None
+        if is_city and task.tiles:
+            found, of_tiles = _joined_city(scene, detector, task)
+        elif is_city:
             found = _detect_city(scene, detector, task.seed, task.scene.tile)
         elif task.part is None:
             found = detect(scene, detector, seed=task.seed)
         else:
             found = _detect_part(scene, detector, task.seed, task.part, whole.extent)
-        cost = _cost_since(started)
+        cost = of_tiles or _cost_since(started)
         codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
     except MissingInputError as error:  # the scene lacks an input, or this machine a program
         return Outcome(status="skipped", reason=reason_of(error), scene=record, machine=machine_facts())
@@ -147,6 +160,31 @@ def execute(
         scores=tuple(result for result in results if isinstance(result, Score)),
         score_failures=tuple(result for result in results if isinstance(result, ScoreFailure)),
     )
+
+
+def _window_key(recipe: SceneRecipe, part: TilePart) -> str:
+    return repr((recipe, recipe.written, part))
+
+
+def _read_ahead(scene: Scene, recipe: SceneRecipe, part: TilePart) -> None:
+    """Begin to read the window of the tile that comes next."""
+
+    def read() -> Scene:
+        window = _window(scene, part)
+        window.for_detection()
+        return window
+
+    _ahead.start(_window_key(recipe, part), read)
+
+
+def _joined_city(scene: Scene, detector: Detector, task: Task) -> tuple[Footprints, Cost]:
+    """Return the city of stored tiles, and what they cost."""
+    files = {tile_of_file(Path(file), task.scene.tile): Path(file) for file in task.tiles}
+    joined = join_outcomes(files, detector, scene.crs)
+    if len(joined.skipped) == len(files):
+        raise MissingInputError(next(iter(joined.skipped.values())))
+    metadata = {"notes": list(joined.notes)} if joined.notes else {}
+    return dataclasses.replace(joined.footprints, metadata=metadata), joined.cost
 
 
 def _window(scene: Scene, part: TilePart) -> Scene:
@@ -195,11 +233,34 @@ def score(
     area: Geometry | None,
     grid: Grid | None,
 ) -> Score | ScoreFailure:
-    """Return the score by an evaluator, or its failure; `code` is the digest of its source."""
+    """Return the score by an evaluator, or its failure; `code` is the digest of its source.
+
+    Large sets, those of cities, are compared in parts where the evaluator can do it: with the same result, and one part
+    in memory at a time.
+    """
+    many = max(len(detected), len(reference))
     try:
+        if many >= _MANY and _divides(evaluator, area, grid):
+            return _score_in_parts(detected, reference, recipe, code, evaluator, 1 + many // _PART)
         return Score.of(evaluator.evaluate(detected, reference, area=area, grid=grid), recipe, code)
     except Exception as error:
         return ScoreFailure(evaluator=recipe, code=code, reason=reason_of(error))
+
+
+def _divides(evaluator: Evaluator, area: Geometry | None, grid: Grid | None) -> bool:
+    """Return whether an evaluator compares in parts: exact areas, everywhere."""
+    exact = area is None and isinstance(evaluator, ThresholdFree) and evaluator.gsd is None
+    return exact and (evaluator.area == "exact" or (evaluator.area == "auto" and grid is None))  # type: ignore[attr-defined]
+
+
+def _score_in_parts(
+    detected: Footprints, reference: Footprints, recipe: PluginRecipe, code: str, evaluator: Evaluator, parts: int
+) -> Score:
+    assert isinstance(evaluator, ThresholdFree)
+    with tempfile.TemporaryDirectory(prefix="roofbench-") as work:
+        evaluation, verdicts = evaluate_sets(evaluator, detected, reference, Path(work), parts=parts)
+    score = Score.of(evaluation, recipe, code)
+    return dataclasses.replace(score, verdicts=tuple(table.to_bytes() for table in verdicts))
 
 
 def reason_of(error: Exception) -> str:
@@ -216,7 +277,7 @@ def describe(scene: Scene, *, is_city: bool = False) -> SceneRecord:
     grid, picture = (None, None) if is_city else (scene.evaluation_grid, scene_picture(scene))
     labels = None if reference is None or reference.building_ids is None else reference.building_ids
     return SceneRecord(
-        content_hash=scene.content_hash,
+        content_hash=scene.window(scene.extent).content_hash if is_city else scene.content_hash,
         crs=scene.crs,
         extent=scene.extent,
         grid=None if grid is None else dataclasses.astuple(grid),

@@ -73,8 +73,8 @@ def lower_superstructures(
     most : int
         Largest number of cells of a roof structure.
     division : Division, optional
-        Squares at whose borders long patches are divided before frames are searched. Long patches are no
-        superstructures: what is decided at a place must not depend on what a window of the scene does not show.
+        Says which patches are long: they are neither searched for frames nor superstructures, because what is decided
+        at a place must not depend on what a window of the scene does not show.
     threads : Threads
     """
     if share > 1:
@@ -102,6 +102,19 @@ def _too_long(labels: Labels, count: int, division: Division | None) -> Mask:
     return np.asarray(longer_patches(labels, count, division.longest))
 
 
+def _without_long(
+    height: Heights, mask: Mask | Labels, step: float, division: Division | None, threads: Threads
+) -> Mask | Labels:
+    """Return the cells of a mask that belong to no long patch; a row of houses that is cut somewhere looks like frames.
+
+    `step` is in metres.
+    """
+    if division is None:
+        return mask
+    labels, count = label_patches(height, mask, round(100 * step), threads=threads)
+    return np.asarray((labels > 0) & ~_too_long(labels, count, division)[labels])
+
+
 def _lower_storeys(
     height: Heights, state: States, roof: Mask, step: int, division: Division | None, threads: Threads
 ) -> tuple[Heights, States]:
@@ -126,7 +139,13 @@ def _lower_storeys(
     threads.bands(lambda first, last: _add_shadows(state.T, first, last, solid.T), columns)
     boxes = np.concatenate(
         [
-            propose_boxes(smooth, mask, steps=(metres,), least_cells=24, division=division, threads=threads)
+            propose_boxes(
+                smooth,
+                _without_long(smooth, mask, metres, division, threads),
+                steps=(metres,),
+                least_cells=24,
+                threads=threads,
+            )
             for mask, metres in ((solid, 1e6), (labels, 0.01 * step))
         ]
     )

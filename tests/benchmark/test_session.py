@@ -3,8 +3,8 @@
 import pytest
 
 import roofbench as rb
+from roofbench.benchmark.execution.executors import Execution
 from roofbench.benchmark.execution.isolation import Limits
-from roofbench.benchmark.execution.runner import Execution
 from roofbench.benchmark.suite import read_suite
 from roofbench.core.errors import UnknownNameError
 

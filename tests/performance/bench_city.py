@@ -78,7 +78,7 @@ CHILD = """
 import json, sys
 from pathlib import Path
 from roofbench.benchmark.execution.city import City, detect_city
-from roofbench.benchmark.execution.runner import Execution
+from roofbench.benchmark.execution.executors import Execution
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.core.memory import highest_memory
 from roofbench.detectors.registry import make_detector

@@ -17,7 +17,8 @@ import shapely
 
 import roofbench as rb
 from roofbench.benchmark.analysis.sweep import axis_of, make_sweep, sweep_table
-from roofbench.benchmark.execution.runner import Execution, run_plan
+from roofbench.benchmark.execution.executors import Execution
+from roofbench.benchmark.execution.runner import run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.store.writer import Store
 from roofbench.benchmark.suite import DetectorEntry, Suite

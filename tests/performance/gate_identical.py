@@ -15,7 +15,8 @@ import numpy as np
 
 from roofbench.benchmark.analysis.baseline import Measured
 from roofbench.benchmark.analysis.gate import compare_detector, margins_of
-from roofbench.benchmark.execution.runner import Execution, run_plan
+from roofbench.benchmark.execution.executors import Execution
+from roofbench.benchmark.execution.runner import run_plan
 from roofbench.benchmark.identity.recipes import PluginRecipe, SceneRecipe
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store

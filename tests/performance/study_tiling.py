@@ -17,7 +17,7 @@ import shapely
 from mirrored_town import mirror
 
 from roofbench.benchmark.execution.city import City, detect_city
-from roofbench.benchmark.execution.runner import Execution
+from roofbench.benchmark.execution.executors import Execution
 from roofbench.benchmark.execution.worker import detect
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.core.memory import highest_memory

@@ -10,7 +10,7 @@ from builders.town import HOUSES, SIDE, SOUTH, WEST, town
 
 import roofbench as rb
 from roofbench.benchmark.execution.city import City, detect_city
-from roofbench.benchmark.execution.runner import Execution
+from roofbench.benchmark.execution.executors import Execution
 from roofbench.benchmark.suite import scenes_of
 from roofbench.core.errors import InputError
 from roofbench.detectors.registry import make_detector

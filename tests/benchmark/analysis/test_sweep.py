@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from roofbench.benchmark.analysis.sweep import Axis, axis_of, break_downs, make_sweep, run_sweep
-from roofbench.benchmark.execution.runner import Execution
+from roofbench.benchmark.execution.executors import Execution
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.store.writer import Store
 from roofbench.benchmark.suite import DetectorEntry, Suite

@@ -16,7 +16,8 @@ from harness.command_line import run
 
 import roofbench as rb
 from roofbench.benchmark.execution.city import City, detect_city
-from roofbench.benchmark.execution.runner import Execution, run_plan
+from roofbench.benchmark.execution.executors import Execution
+from roofbench.benchmark.execution.runner import run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store

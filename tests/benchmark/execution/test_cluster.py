@@ -12,8 +12,9 @@ import pytest
 from builders.town import town_folder
 
 from roofbench.benchmark.execution.city import City, detect_city
+from roofbench.benchmark.execution.executors import Execution
 from roofbench.benchmark.execution.isolation import close_isolated
-from roofbench.benchmark.execution.runner import Execution, run_plan
+from roofbench.benchmark.execution.runner import run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store

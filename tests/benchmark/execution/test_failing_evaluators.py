@@ -6,7 +6,8 @@ import pytest
 
 import roofbench as rb
 from roofbench.benchmark.analysis.leaderboard import make_leaderboard
-from roofbench.benchmark.execution.runner import Execution, run_plan, score_stored
+from roofbench.benchmark.execution.executors import Execution
+from roofbench.benchmark.execution.runner import run_plan, score_stored
 from roofbench.benchmark.identity.recipes import SceneRecipe
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import roofbench as rb
-from roofbench.benchmark.execution.runner import Execution, run_plan
+from roofbench.benchmark.execution.executors import Execution
+from roofbench.benchmark.execution.runner import run_plan
 from roofbench.benchmark.identity import keys
 from roofbench.benchmark.identity.keys import source_closure
 from roofbench.benchmark.identity.recipes import SceneRecipe

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import roofbench as rb
-from roofbench.benchmark.execution.runner import Execution, run_plan
+from roofbench.benchmark.execution.executors import Execution
+from roofbench.benchmark.execution.runner import run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe, label_of
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store
