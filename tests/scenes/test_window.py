@@ -8,6 +8,7 @@ from builders.small_scenes import CRS, SOUTH, WEST, cloud, image, scene
 import roofbench as rb
 from roofbench.core.errors import InputError
 from roofbench.scenes.folder import open_scene, save_scene
+from roofbench.scenes.geodata.density import point_counts
 from roofbench.scenes.geodata.las_files import read_points
 
 EXTENT = (WEST + 12.25, SOUTH + 5.5, WEST + 25.0, SOUTH + 20.0)
@@ -103,3 +104,16 @@ def test_the_ground_of_a_complete_dem_is_the_same_in_a_window():
     whole = scene(dem=dem)
     part = whole.window((WEST + 10, SOUTH + 10, WEST + 20, SOUTH + 20), halo=2)
     assert part.heights.ground.sample(WEST + 15.3, SOUTH + 15.7) == dem.sample(WEST + 15.3, SOUTH + 15.7)
+
+
+def test_the_density_of_a_window_is_that_of_the_scene_away_from_its_border():
+    rng = np.random.default_rng(8)
+    x, y = 84000 + rng.uniform(0, 300, 90_000), 447000 + 300 * rng.beta(2, 3, 90_000)
+    whole = rb.Scene("density", (84000, 447000, 84300, 447300), points=rb.PointCloud(x=x, y=y, z=np.zeros(len(x))))
+    core = (84100.0, 447100.0, 84200.0, 447180.0)
+    part = whole.window(core, halo=8)
+    grid, around = (rb.Grid.covering(extent, 4.0) for extent in (core, part.extent))
+    counts = point_counts(x, y, grid)
+    assert np.array_equal(point_counts(part.points.x, part.points.y, grid), counts)
+    assert np.array_equal(point_counts(part.points.x, part.points.y, around)[2:-2, 2:-2], counts)
+    assert counts.min() > 0
