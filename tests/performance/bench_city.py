@@ -1,14 +1,16 @@
 """Time, memory and bits of a detector on a growing city: ``python tests/performance/bench_city.py SCENE WORK``.
 
-A scene folder is mirrored to N x N copies (`mirrored_town`), kept in WORK for the next call. For each size the detector
-runs tile by tile with one worker, with two, and on a Dask cluster of separate processes (``--modes``), each from the
-files on disk to the footprints on disk. One line is printed and appended to WORK/city.csv for each: wall time,
-processor time of all processes, the highest memory of a worker and of this process, points per second, and the checksum
-of the output, which must not depend on the mode. WORK/city.png shows time and memory against the number of copies on
-logarithmic axes, with a line of equal time per copy.
+A scene folder is mirrored to N x N copies (`mirrored_town`), kept in WORK for the next call. For each size the
+detector runs tile by tile with two workers, and for one of them (``--compare``, 4 copies along each axis) also with
+one worker and on a Dask cluster of separate processes (``--modes``), each from the files on disk to the footprints on
+disk. Runs that WORK/city.csv holds already are not repeated. One line is printed and appended to WORK/city.csv for
+each: wall time, processor time of all processes, the highest memory of a worker and of this process, points per
+second, and the checksum of the output, which must not depend on the mode. WORK/city.png shows time and memory against
+the number of copies on logarithmic axes, with a line of equal time per copy.
 
-``--kill`` stops the run with two workers when half of the tiles are done, by the signal KILL, and starts it again: the
-result must be the same, and no finished tile is computed again. ``--peers`` adds other programs on the scene itself.
+``--kill`` stops the run with two workers of that size when half of the tiles are done, by the signal KILL, and starts
+it again: the result must be the same, and no finished tile is computed again. ``--peers`` adds other programs on the
+scene itself.
 """
 
 import argparse
@@ -172,6 +174,14 @@ def peers(options, points):
         )
 
 
+def finished(table):
+    """Return copies, detector and mode of the runs that are measured."""
+    if not table.exists():
+        return set()
+    with table.open(newline="") as stream:
+        return {(row["copies"], row["detector"], row["mode"]) for row in csv.DictReader(stream)}
+
+
 def plot(rows, path):
     """Draw time and memory against the number of copies."""
     import matplotlib.pyplot as plt
@@ -197,6 +207,7 @@ def main():
     parser.add_argument("scene", type=Path)
     parser.add_argument("work", type=Path)
     parser.add_argument("--sides", type=int, nargs="+", default=[1, 2, 4], help="copies along each axis")
+    parser.add_argument("--compare", type=int, default=4, help="copies along each axis for all modes and --kill")
     parser.add_argument("--detector", default="mpp")
     parser.add_argument("--modes", nargs="+", default=["jobs1", "jobs2", "dask"])
     parser.add_argument("--tile", type=float, default=512.0)
@@ -212,7 +223,9 @@ def main():
         town, copies = options.work / f"town-{side}", side * side
         if not (town / "scene.toml").is_file():
             mirror(open_scene(options.scene), town, side, side)
-        for mode in options.modes:
+        for mode in options.modes if side == options.compare else ("jobs2",):
+            if (str(copies), options.detector, mode) in finished(table):
+                continue
             row = measured(town, points * copies, copies, mode, options)
             is_new = not table.exists()
             with table.open("a", newline="") as stream:
@@ -221,7 +234,7 @@ def main():
                     writer.writeheader()
                 writer.writerow(row)
             print(", ".join(f"{name} {value}" for name, value in row.items()), flush=True)
-        if options.kill:
+        if options.kill and side == options.compare:
             print(killed(town, copies, options), flush=True)
     with table.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
