@@ -257,22 +257,25 @@ def detectors(_folders, presets=IMAGED, scene_seeds=(1, 2, 3)):
     """Print means over scene seeds, and the lead of the process: it sees points and DEM, the others the image, too."""
     print("\n| preset | detector | C_m % | C_r % | Q_l % | M_d % | Q_lp % |\n|---|---|--:|--:|--:|--:|--:|")
     for preset in presets:
-        found = {name: np.array(list(rows_of(name, preset, scene_seeds))) for name in RIVALS}
-        for name, rows in found.items():
-            print(f"| {preset} | {name} | " + " | ".join(f"{v:.1f}" for v in rows.mean(axis=0)) + " |", flush=True)
+        rows = {name: [] for name in RIVALS}
+        for seed in scene_seeds:
+            scene = rb.make_scene(preset, seed=seed)
+            for name in RIVALS:
+                rows[name].append(shares_of(name, scene))
+            print(f"  seed {seed}, Q_l: " + ", ".join(f"{name} {rows[name][-1][2]:.1f}" for name in RIVALS), flush=True)
+        for name in RIVALS:
+            print(f"| {preset} | {name} | " + " | ".join(f"{v:.1f}" for v in np.mean(rows[name], axis=0)) + " |")
         for name in RIVALS[1:]:
-            lead = found[RIVALS[0]] - found[name]
+            lead = np.array(rows[RIVALS[0]]) - np.array(rows[name])
             mean, error = lead.mean(axis=0), lead.std(axis=0, ddof=1) / np.sqrt(len(lead))
             print(f"  lead over {name}: Q_l {mean[2]:+.1f} ± {error[2]:.1f}, Q_lp {mean[4]:+.1f} ± {error[4]:.1f}")
 
 
-def rows_of(name, preset, scene_seeds):
-    for seed in scene_seeds:
-        scene = rb.make_scene(preset, seed=seed)
-        found = rb.make_detector(name).detect(scene.for_detection(), np.random.default_rng(0))
-        result = rb.evaluate(found, scene.reference)
-        shares = result.object.completeness, result.object.correctness, result.object.quality
-        yield [100 * (share or 0) for share in (*shares, result.object.multiple_detection_rate, result.pixel.quality)]
+def shares_of(name, scene):
+    found = rb.make_detector(name).detect(scene.for_detection(), np.random.default_rng(0))
+    result = rb.evaluate(found, scene.reference)
+    shares = result.object.completeness, result.object.correctness, result.object.quality
+    return [100 * (share or 0) for share in (*shares, result.object.multiple_detection_rate, result.pixel.quality)]
 
 
 def best_rectangle(polygon):
