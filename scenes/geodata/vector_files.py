@@ -29,6 +29,7 @@ from .layer_styles import add_layer_styles
 from .ogr_layers import layer_names, quiet, read_layer
 from .parquet_files import read_parquet, write_parquet
 from .polygon_repair import Repair
+from .shapefile_parts import damaged_rows, refuse_broken_parts
 from .vector_columns import storable_columns
 from .wkb import geometries_of_wkb
 
@@ -239,7 +240,8 @@ def readable_layer(file: Path, layer: str | None) -> Iterator[tuple[Path, str]]:
 
     if not (file.is_dir() and file.suffix.lower() == ".gdb"):
         require_file(file, "a vector file, for instance .gpkg or .geojson")
-    _refuse_cut_off(file)
+    if file.suffix.lower() == ".shp":
+        refuse_broken_parts(file)
     with plain_path(file) as path:
         try:
             names = layer_names(path)
@@ -266,6 +268,14 @@ def _read_ogr(
         found = read_layer(path, name)
     if found.wkb is None:
         raise InputError(f"{file}: no polygons: the layer {name!r} has no geometry")
+    if file.suffix.lower() == ".shp":
+        lacking = np.flatnonzero([one is None for one in found.wkb])
+        damaged = damaged_rows(file, lacking, len(found.wkb))
+        if len(damaged):
+            raise InputError(
+                f"{file}: {len(damaged)} outlines are damaged (the first is feature {damaged[0]}): copy or download it "
+                "again"
+            )
     columns = dict(found.columns)
     if file.suffix.lower() == ".shp" and "building_i" in columns:
         columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name
@@ -276,20 +286,6 @@ def _read_ogr(
 def named_or_none(crs: str) -> str | None:
     """Return the CRS of a file as it is; None for a local or undefined one."""
     return crs if crs.upper().startswith("EPSG:") else crs if file_crs(parse_crs(crs)) is not None else None
-
-
-def _refuse_cut_off(file: Path) -> None:
-    """Refuse a Shapefile that is shorter than its header says: GDAL reads what is missing as rows without geometry."""
-    if file.suffix.lower() != ".shp":
-        return
-    size = file.stat().st_size
-    with file.open("rb") as stream:
-        head = stream.read(28)
-    announced = 2 * int.from_bytes(head[24:28], "big")
-    if len(head) < 28 or size < announced:
-        raise InputError(
-            f"{file} is truncated: it has {size} bytes, its header announces {announced}; copy or download it again"
-        )
 
 
 def _write_ogr(

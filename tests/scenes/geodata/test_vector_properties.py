@@ -139,3 +139,36 @@ def test_degrees_in_other_formats_are_refused(tmp_path):
         read_footprints(tmp_path / "a.gpkg")
     with pytest.raises(CRSError, match="are degrees and no metres"):
         open_stream(tmp_path / "a.gpkg")
+
+
+@pytest.mark.parametrize(
+    ("part", "place", "value", "message"),
+    [
+        (".dbf", 4, struct.pack("<I", 2), r"table \(.dbf\) has 2 rows for 3 outlines"),
+        (".shx", 116, None, r"index \(.shx\) of 2 rows ends at byte 372 of 508"),
+        (".shx", 108, struct.pack(">I", 7), "1 outlines are damaged .* feature 1"),
+        (".shp", 280, struct.pack("<I", 999), "1 outlines are damaged .* feature 1"),
+    ],
+    ids=["rows of the table", "rows of the index", "place", "number of points"],
+)
+def test_parts_of_a_shapefile_that_do_not_belong_together_lose_no_outline(tmp_path, part, place, value, message):
+    file = shapefile(tmp_path / "a.shp", n=np.arange(3))
+    content = bytearray(file.with_suffix(part).read_bytes())
+    if value is None:
+        del content[place:]
+        struct.pack_into(">I", content, 24, len(content) // 2)
+    else:
+        content[place : place + len(value)] = value
+    file.with_suffix(part).write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        read_footprints(file)
+
+
+def test_a_row_without_outline_is_left_out_of_a_shapefile_and_reported(tmp_path):
+    file = shapefile(tmp_path / "a.shp", n=np.arange(3))
+    content = bytearray(file.read_bytes())
+    struct.pack_into("<I", content, 244, 0)
+    file.write_bytes(content)
+    footprints = read_footprints(file)
+    assert len(footprints) == 2
+    assert [str(repair) for repair in footprints.repairs] == ["feature 1: no geometry: left out"]
