@@ -63,6 +63,17 @@ class FootprintStream:
 
     def batches(self, columns: list[str]) -> Iterator[Any]:
         """Yield `pyarrow.RecordBatch` of the geometry and these columns."""
+        found = self._batches(columns)
+        while True:
+            try:
+                batch = next(found, None)
+            except OSError as error:  # what Arrow says of a file that ends early
+                raise InputError(f"{self.file} is truncated or broken ({error}): copy or download it again") from error
+            if batch is None:
+                return
+            yield batch
+
+    def _batches(self, columns: list[str]) -> Iterator[Any]:
         if self.layer is None:
             import pyarrow.parquet
 
@@ -107,6 +118,11 @@ class FootprintStream:
                 labels = labels.take(_arrow().array(outlines.ids - first))
             yield outlines, labels
             first += len(batch)
+        if first < self.count:
+            raise InputError(
+                f"{self.file} is truncated: {first} of the {self.count} features that its header announces are there; "
+                "copy or download it again"
+            )
 
     def wkb(self, batch: Any) -> Any:
         """Return the geometries of a batch as a `pyarrow.Array` of WKB."""

@@ -16,6 +16,8 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import InputError
+
 __all__ = ["Layer", "layer_names", "quiet", "read_layer"]
 
 #: Type of numpy to that of a field of OGR; any other is read as text.
@@ -97,6 +99,14 @@ def _read(path: Path, name: str) -> Layer:
             if not dates:
                 raise
             source = _virtual(path, name, kinds)
+    if path.suffix.lower() == ".fgb":
+        # Other formats count what they read; the header of this one counts what was written.
+        announced = pyogrio.read_info(path, layer=name)["features"]
+        if len(wkb) < announced:
+            raise InputError(
+                f"{path.name} is truncated: {len(wkb)} of the {announced} features that its header announces are "
+                "there; copy or download it again"
+            )
     columns = dict(zip(map(str, meta["fields"]), fields, strict=True))
     for label, column in columns.items():
         if label in dates:

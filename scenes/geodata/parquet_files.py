@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...core.errors import InputError, OutputError
+from ...core.errors import CRSError, InputError, OutputError
 from ...core.inputs import require_file
 from ...core.plain_paths import plain_path
 from .crs import file_crs
@@ -21,21 +21,33 @@ from .wkb import geometries_of_wkb
 __all__ = ["read_parquet", "write_parquet"]
 
 
-def read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None, list[Repair]]:
-    """Return geometries, columns, CRS and repaired rings of a GeoParquet file."""
+#: What geopandas, pyarrow and pandas raise for columns and descriptions that they do not know.
+_UNREADABLE = (ValueError, OSError, LookupError, TypeError, AttributeError, NotImplementedError, ArithmeticError)
+
+
+def read_parquet(
+    file: Path, *, needs_crs: bool = True
+) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None, list[Repair]]:
+    """Return geometries, columns, CRS and repaired rings of a GeoParquet file.
+
+    Columns that cannot be converted are left out.
+
+    Parameters
+    ----------
+    file : Path
+    needs_crs : bool
+        Whether a CRS that cannot be read is an error; if not, it is None.
+    """
+    from pyproj.exceptions import CRSError as ProjError
+
     require_file(file, "a vector file, for instance .gpkg or .geojson")
     geopandas = _support(file, InputError)
-    closed: list[Repair] = []
     try:
-        try:
-            with plain_path(file) as path:
-                frame = geopandas.read_parquet(path)
-        except shapely.errors.GEOSException:  # one ring that is not closed spoils the whole column
-            frame, closed = _read_wkb(geopandas, file)
-    except shapely.errors.GEOSException as error:
-        raise InputError(f"{file}: a geometry is damaged ({error}): copy or download it again") from error
-    except (ValueError, OSError) as error:
-        raise InputError(f"{file} cannot be read as GeoParquet: {' '.join(str(error).split())}") from error
+        with plain_path(file) as path:
+            frame = geopandas.read_parquet(path)
+    except (*_UNREADABLE, shapely.errors.GEOSException, ProjError) as error:
+        # One ring that is not closed, a date out of range or a CRS in other words spoils the whole.
+        return _read_parts(file, error, needs_crs=needs_crs)
     columns = {}
     for name in frame.columns:
         if name != frame.geometry.name:
@@ -44,21 +56,50 @@ def read_parquet(file: Path) -> tuple[NDArray[np.object_], dict[str, NDArray[Any
                 values = np.where(frame[name].isna(), None, values)
             columns[str(name)] = values
     crs = None if frame.crs is None else file_crs(frame.crs)
-    return np.asarray(frame.geometry.array, dtype=object), columns, crs, closed
+    return np.asarray(frame.geometry.array, dtype=object), columns, crs, []
 
 
-def _read_wkb(geopandas: Any, file: Path) -> tuple[Any, list[Repair]]:
-    """Return the frame of a file whose geometries are WKB, with its rings closed."""
+def _read_parts(
+    file: Path, reason: Exception, *, needs_crs: bool
+) -> tuple[NDArray[np.object_], dict[str, NDArray[Any]], str | None, list[Repair]]:
+    """Return the same of a file whose geometries are WKB, column by column."""
     import pyarrow.parquet
+    import pyproj
+    from pyproj.exceptions import CRSError as ProjError
 
-    with plain_path(file) as path:
-        table = pyarrow.parquet.read_table(path)
-    facts = json.loads(table.schema.metadata[b"geo"])
-    name = facts["primary_column"]
-    geometries, closed = geometries_of_wkb(np.array(table[name].to_pylist(), dtype=object), file)
+    try:
+        with plain_path(file) as path:
+            table = pyarrow.parquet.read_table(path)
+        facts = json.loads(table.schema.metadata[b"geo"])
+        name = facts["primary_column"]
+        described = facts["columns"][name]
+        wkb = np.array(table[name].to_pylist(), dtype=object)
+        if described["encoding"] != "WKB":
+            raise ValueError(described["encoding"])
+    except _UNREADABLE:
+        words = " ".join(str(reason).split()) or type(reason).__name__
+        raise InputError(f"{file} cannot be read as GeoParquet: {words}") from reason
+    geometries, closed = geometries_of_wkb(wkb, file)
     # A missing CRS is that of RFC 7946, as the standard says; null is none.
-    crs = facts["columns"][name].get("crs", "OGC:CRS84")
-    return geopandas.GeoDataFrame(table.drop([name]).to_pandas(), geometry=list(geometries), crs=crs), closed
+    named = described.get("crs", "OGC:CRS84")
+    try:
+        crs = None if named is None else file_crs(pyproj.CRS.from_user_input(named))
+    except ProjError as error:
+        if needs_crs:
+            raise CRSError(f"{file}: its CRS cannot be read ({error}): name the CRS by crs=") from error
+        crs = None
+    columns: dict[str, NDArray[Any]] = {}
+    for label in table.column_names:
+        if label != name:
+            try:
+                column = table[label].to_pandas()
+                values = np.array(column.to_numpy())
+                if values.dtype.kind == "O":
+                    values[column.isna().to_numpy()] = None
+                columns[str(label)] = values
+            except _UNREADABLE:
+                continue
+    return geometries, columns, crs, closed
 
 
 def write_parquet(

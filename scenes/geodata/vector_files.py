@@ -113,7 +113,7 @@ def read_footprints(
     if file.suffix.lower() in ENDINGS:
         geometries, columns, own_crs = read_labels(file)
     elif DRIVERS.get(file.suffix.lower()) == "Parquet":
-        geometries, columns, own_crs, closed = read_parquet(file)
+        geometries, columns, own_crs, closed = read_parquet(file, needs_crs=crs is None)
     else:
         geometries, columns, own_crs, closed = _read_ogr(file, layer)
     if crs is None and own_crs in JSON_SYSTEMS and not json_means_degrees(file, geometries):

@@ -172,3 +172,58 @@ def test_a_row_without_outline_is_left_out_of_a_shapefile_and_reported(tmp_path)
     footprints = read_footprints(file)
     assert len(footprints) == 2
     assert [str(repair) for repair in footprints.repairs] == ["feature 1: no geometry: left out"]
+
+
+def test_a_flatgeobuf_that_is_cut_off_loses_no_row_in_silence(tmp_path):
+    file = tmp_path / "a.fgb"
+    write_footprints(Footprints.of(SQUARES, crs="EPSG:25832"), file)
+    whole = file.read_bytes()
+    indexed = tmp_path / "b.fgb"
+    pyogrio.raw.write(
+        indexed, shapely.to_wkb(SQUARES), field_data=[], fields=[], geometry_type="Polygon", crs="EPSG:25832"
+    )
+    for content in (whole, indexed.read_bytes()):
+        for share in (0.6, 0.75, 0.9):
+            file.write_bytes(content[: int(share * len(content))])
+            for read in (read_footprints, lambda path: list(open_stream(path).outlines())):
+                with pytest.raises(InputError, match=r"truncated|cannot be read|no layers"):
+                    read(file)
+
+
+def described(path, **changes):
+    """Write GeoParquet whose description of the geometry, or of the file, is changed."""
+    import pyarrow.parquet
+
+    write_footprints(Footprints.of(SQUARES, crs="EPSG:25832"), path)
+    table = pyarrow.parquet.read_table(path)
+    facts = json.loads(table.schema.metadata[b"geo"])
+    for name, value in changes.items():
+        (facts if name in facts else facts["columns"]["geometry"])[name] = value
+    pyarrow.parquet.write_table(table.replace_schema_metadata({b"geo": json.dumps(facts).encode()}), path)
+    return path
+
+
+@pytest.mark.parametrize("crs", [{"type": "ProjectedCRS"}, "EPSG:999999", "local"])
+def test_a_crs_of_geoparquet_that_cannot_be_read_is_replaced_by_the_one_that_is_given(tmp_path, crs):
+    file = described(tmp_path / "a.parquet", crs=crs)
+    with pytest.raises(CRSError, match="name the CRS by crs="):
+        read_footprints(file)
+    assert len(read_footprints(file, crs="EPSG:25832")) == 3
+
+
+@pytest.mark.parametrize("changes", [{"primary_column": "geom"}, {"columns": {}}, {"columns": 3}, {"encoding": "WKX"}])
+def test_geoparquet_that_describes_something_else_is_refused(tmp_path, changes):
+    with pytest.raises(InputError, match="cannot be read as GeoParquet"):
+        read_footprints(described(tmp_path / "a.parquet", **changes))
+
+
+def test_a_column_of_geoparquet_that_cannot_be_converted_is_left_out(tmp_path):
+    import pyarrow.parquet
+
+    file = described(tmp_path / "a.parquet")
+    table = pyarrow.parquet.read_table(file)
+    far = pyarrow.array([-1_000_000_000] * 3, pyarrow.date32())
+    pyarrow.parquet.write_table(table.append_column("far", far).append_column("n", pyarrow.array([1, 2, 3])), file)
+    footprints = read_footprints(file)
+    assert len(footprints) == 3
+    assert footprints.attributes["n"].tolist() == [1, 2, 3]
