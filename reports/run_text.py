@@ -23,6 +23,7 @@ def format_run(store: Store, row: RunRow) -> str:
         f"  detector   {row.detector}  {json.dumps(row.parameters)}",
         f"  scene      {row.scene}, key {row.scene_key[:16]}",
         *(f"  note       {one_line(str(note))}" for note in store.run_notes([row.id]).get(row.id, ())),
+        *_evaluations(store, row),
         f"  seed       {row.seed}",
         f"  code       roofbench {row.version}, {len(code.modules)} modules, digest {code.digest[:16]}",
         f"  benchmark  {'not recorded' if row.benchmark is None else f'version {row.benchmark}'}",
@@ -36,6 +37,17 @@ def format_run(store: Store, row: RunRow) -> str:
     if row.traceback:
         lines += ["", row.traceback.rstrip()]
     return "\n".join(lines)
+
+
+def _evaluations(store: Store, row: RunRow) -> list[str]:
+    """Return a line for each evaluator that failed on the run, with its reason and what to do."""
+    lines = []
+    for name, parameters, reason in store.failed_evaluators(row.id):
+        what = f"{one_line(name)}  {parameters}" if name else "one that is not recorded"
+        lines.append(f"  evaluator  {what} failed: {one_line(reason)}")
+    if lines:
+        lines.append("             the detections are stored: correct the evaluator, then run 'roofbench score'")
+    return lines
 
 
 def _changes(store: Store, row: RunRow) -> str:

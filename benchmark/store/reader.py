@@ -77,6 +77,17 @@ class StoreReader:
         rows = self._db.execute("SELECT run_id, reason FROM evaluation_failures WHERE key = ?", (key,))
         return {int(row["run_id"]): str(row["reason"]) for row in rows if row["run_id"] in wanted}
 
+    def failed_evaluators(self, run_id: int) -> list[tuple[str, str, str]]:
+        """Return name, parameters (JSON) and reason of each evaluator that failed on a run and has no score since.
+
+        Name and parameters are empty where a store of an older version did not keep them.
+        """
+        rows = self._db.execute(
+            "SELECT evaluator, parameters, reason FROM evaluation_failures WHERE run_id = ? ORDER BY evaluator, key",
+            (run_id,),
+        )
+        return [(str(row[0] or ""), str(row[1] or ""), str(row[2])) for row in rows]
+
     def described_scenes(self) -> set[str]:
         """Return the keys of the scenes whose content and reference are stored."""
         return {str(row[0]) for row in self._db.execute("SELECT key FROM scenes WHERE content_hash IS NOT NULL")}

@@ -13,7 +13,7 @@ from ...core.errors import InputError
 
 __all__ = ["VERSION", "prepare"]
 
-VERSION = 5
+VERSION = 6
 
 #: One script per version: MIGRATIONS[n] leads from version n to n + 1.
 MIGRATIONS: tuple[str, ...] = (
@@ -150,6 +150,11 @@ MIGRATIONS: tuple[str, ...] = (
     """
     ALTER TABLE runs ADD COLUMN benchmark INTEGER;
     ALTER TABLE evaluations ADD COLUMN benchmark INTEGER;
+    """,
+    # The evaluator that failed; NULL where it was not recorded.
+    """
+    ALTER TABLE evaluation_failures ADD COLUMN evaluator TEXT;
+    ALTER TABLE evaluation_failures ADD COLUMN parameters TEXT;
     """,
 )
 

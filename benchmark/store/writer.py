@@ -132,7 +132,10 @@ class Store(StoreReader):
 
     def _score_failure(self, run_id: int, failure: ScoreFailure) -> None:
         key = evaluation_key(failure.evaluator, failure.code)
-        self._db.execute("INSERT OR REPLACE INTO evaluation_failures VALUES (?, ?, ?)", (run_id, key, failure.reason))
+        self._db.execute(
+            "INSERT OR REPLACE INTO evaluation_failures VALUES (?, ?, ?, ?, ?)",
+            (run_id, key, failure.reason, failure.evaluator.use, canonical(dict(failure.evaluator.parameters))),
+        )
 
     def _score(self, run_id: int, score: Score) -> None:
         key = evaluation_key(score.evaluator, score.code)

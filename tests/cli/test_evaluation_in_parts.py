@@ -179,6 +179,8 @@ def test_files_of_two_places_are_named(files):
         assert "no overlap at all, check the CRS" in answer.stderr
 
 
+@pytest.mark.filterwarnings("ignore::ResourceWarning:distributed", "ignore::ResourceWarning:tornado")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # sockets that Dask closes late
 def test_a_cluster_gives_the_same_bits(files):
     distributed = pytest.importorskip("distributed")
     here = roofbench("evaluate", "d.gpkg", "r.fgb", "--parts", "5", "-f", "json", "--verdicts", "a.fgb", folder=files)

@@ -1,5 +1,6 @@
 """Each evaluator fails alone: detections and the scores of other evaluators are kept."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from roofbench.benchmark.store.writer import Store
 from roofbench.benchmark.suite import DetectorEntry, Suite
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
+from roofbench.reports.run_text import format_run
 from roofbench.scenes.builtin import hamlet
 
 FAILING = f"{Path(__file__).parents[2] / 'plugins' / 'failing_evaluator.py'}:Failing"
@@ -44,6 +46,10 @@ def test_an_evaluator_that_raises_costs_no_detection_and_no_other_score(misbehav
     assert unsuccessful.status == "not evaluated"
     assert unsuccessful.reason == "failing: ZeroDivisionError: no roof at all"
     assert unsuccessful.command == f"roofbench score -e {FAILING}"
+    with Store(tmp_path / "a.sqlite") as store:
+        text = format_run(store, result.rows[0])
+    assert re.search(r"  evaluator  .*failing_evaluator\.py:Failing  \{.*\} failed: ZeroDivisionError: no roof", text)
+    assert text.count("  evaluator  ") == 1
 
 
 def test_a_crash_during_the_evaluation_costs_no_detection(misbehaving, tmp_path):
