@@ -29,7 +29,14 @@ from numpy.typing import NDArray
 from ...core.errors import InputError, OutputError
 from ...core.inputs import require_file
 from .crs import parse_crs
-from .las_headers import HEADER_BYTES, header_crs, refuse_cut_off, refuse_pointwise, refuse_record_counts
+from .las_headers import (
+    HEADER_BYTES,
+    header_crs,
+    refuse_counts,
+    refuse_cut_off,
+    refuse_pointwise,
+    refuse_record_counts,
+)
 from .point_chunks import chunks_of_file, fits, met_points, refuse_broken_chunks
 from .points import PointCloud
 
@@ -105,8 +112,7 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None, fal
                 f"{file}: scale {header.scales.tolist()} and offset {header.offsets.tolist()} in its header give "
                 "coordinates that are not finite: export it again"
             )
-        if header.point_count == 0:
-            raise InputError(f"{file} holds no points: leave it out or export it again")
+        refuse_counts(file, header)
         bounds = tuple(float(value) for value in (*header.mins, *header.maxs))
         if not np.isfinite(bounds).all():
             raise InputError(f"{file}: the bounds in its header, {bounds}, are not finite: export it again")
@@ -114,6 +120,11 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None, fal
             raise InputError(
                 f"{file}: the bounds in its header are all 0: write the header anew, for instance with lasinfo "
                 "-repair, or export it again if all its points lie at (0, 0, 0)"
+            )
+        if (header.mins > header.maxs).any():
+            raise InputError(
+                f"{file}: the bounds in its header end before they begin, from {header.mins.tolist()} to "
+                f"{header.maxs.tolist()}: write the header anew, for instance with lasinfo -repair"
             )
         own = None if crs is not None else header_crs(file, header, fallback)
         names = set(header.point_format.dimension_names)

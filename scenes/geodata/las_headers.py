@@ -10,7 +10,7 @@ from ...core.errors import CRSError, InputError
 from .crs import crs_label, file_crs, misfit, require_metric
 from .geo_keys import foreign_units, is_user_defined, user_defined_crs
 
-__all__ = ["HEADER_BYTES", "header_crs", "refuse_cut_off", "refuse_pointwise", "refuse_record_counts"]
+__all__ = ["HEADER_BYTES", "header_crs", "refuse_counts", "refuse_cut_off", "refuse_pointwise", "refuse_record_counts"]
 
 #: Length of the longest header (LAS 1.4), bytes.
 HEADER_BYTES = 375
@@ -42,6 +42,22 @@ def refuse_pointwise(file: Path, header: Any) -> None:
                 f"{file} is compressed point by point, as the first releases of LASzip did: write it anew, for "
                 "instance with a current laszip"
             )
+
+
+def refuse_counts(file: Path, header: Any) -> None:
+    """Refuse a number of points that is 0, or that leaves whole points of an uncompressed file unread."""
+    size, count = header.point_format.size, header.point_count
+    behind = (header.start_of_first_evlr, header.start_of_waveform_data_packet_record)
+    end = min([file.stat().st_size, *(start for start in behind if start)])
+    held = end - header.offset_to_point_data
+    whole = not header.are_points_compressed and held > count * size and held % size == 0
+    if whole:
+        raise InputError(
+            f"{file}: its header announces {count} points, and the file holds {held // size}: write the header anew, "
+            "for instance with lasinfo -repair"
+        )
+    if count == 0:
+        raise InputError(f"{file} holds no points: leave it out or export it again")
 
 
 def refuse_cut_off(file: Path, header: Any) -> None:

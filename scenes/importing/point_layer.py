@@ -53,3 +53,8 @@ def _check_bounds(place: Place, cloud: PointCloud, names: str) -> None:
             f"{names}: the header says {extent_text(place.extent)}, but the points lie in {extent_text(real)}: give "
             f"extent=({real[0]:.0f}, {real[1]:.0f}, {real[2]:.0f}, {real[3]:.0f})"
         )
+    if share < 0.25 and xmax - xmin > 2 and ymax - ymin > 2:
+        place.log.note(
+            f"the points lie in {extent_text(real)}, a small part of the scene, {extent_text(place.extent)}: if the "
+            "header is wrong, give the extent"
+        )

@@ -196,3 +196,19 @@ def test_a_table_of_chunks_that_needs_more_than_the_file_is_refused_before_memor
         path.write_bytes(damaged)
         with pytest.raises(InputError, match=reason):
             read_points(path)
+
+
+@pytest.mark.parametrize(("announced", "message"), [(0, "announces 0 points"), (150, "announces 150 points")])
+def test_points_that_the_header_does_not_count_are_not_dropped_silently(tmp_path, announced, message):
+    file = write(tmp_path / "a.las")
+    content = bytearray(file.read_bytes())
+    struct.pack_into("<Q", content, 247, announced)
+    file.write_bytes(content)
+    with pytest.raises(InputError, match=f"{message}, and the file holds 400"):
+        read_las_header(file)
+
+
+def test_bounds_that_end_before_they_begin_are_refused(tmp_path):
+    file = with_bounds(write(tmp_path / "a.las"), WEST, WEST + 20)
+    with pytest.raises(InputError, match="bounds in its header end before they begin"):
+        read_las_header(file)
