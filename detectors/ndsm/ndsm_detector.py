@@ -22,7 +22,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ...core.parameters import parameter
-from ...scenes.geodata.density import point_spacing
+from ...scenes.geodata.density import is_lattice, point_spacing
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.outlines import coverage_of_mask, minimum_rectangles, trace
 from ...scenes.geodata.points import PointCloud
@@ -46,6 +46,8 @@ _Mask = NDArray[np.bool_]
 #: Name of the cue from the image, and its weight against 1 for each cue from the points: roofs may be green, trees in
 #: autumn are not, and roofs are displaced in the image.
 _IMAGE, _IMAGE_WEIGHT = "image vegetation", 0.5
+#: Name of the cue that a raster cannot give: it has one height a cell.
+_PENETRATION = "penetration"
 #: Noise of heights, metres, that the threshold of roughness allows for; image matching may have more.
 _LASER_NOISE = 0.12
 
@@ -147,7 +149,7 @@ class NDSM(Detector):
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
         high = np.nan_to_num(cues.high_share) >= 0.5
         rated = self._cue_likeness(cues, self._vegetation(scene, grid))
-        information = informative_cues(rated, high)
+        information = informative_cues(rated, high, known_silent=self._known_silent(points, grid))
         cue_likeness = {name: rated[name] for name in information.used}
         likeness = _averaged(_mean_of(cue_likeness, grid.shape), high, self.smoothing / grid.gsd)
         roof = high & ((likeness < 0) | np.isnan(likeness))
@@ -187,13 +189,20 @@ class NDSM(Detector):
         index = None if threshold is None else greenness(image, grid, darkest=self.darkest)
         return None if index is None or threshold is None else (index, threshold)
 
+    def _known_silent(self, points: PointCloud, grid: Grid) -> dict[str, str]:
+        """Return why a cue cannot carry information: penetration of a raster fine enough for roughness to do alone."""
+        fine = 2 * grid.gsd <= self.window and self.roughness is not None
+        if fine and self.penetration is not None and is_lattice(points.x, points.y):
+            return {_PENETRATION: "the points are cells of a raster, nothing is seen below them"}
+        return {}
+
     def _cue_likeness(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> dict[str, _Floats]:
         """Return the rating of each cell by each cue: -1 roof, 0 at its threshold, +1 tree, NaN unknown."""
         index, least_index = vegetation or (None, None)
         rules = {
             "multiple returns": (cues.multiple_share, self.multiple_share, 0.25),
             ANCHOR: (cues.roughness, self._roughest_roof(cues.noise), 0.2),
-            "penetration": (cues.penetration, self.penetration, 0.15),
+            _PENETRATION: (cues.penetration, self.penetration, 0.15),
             _IMAGE: (index, least_index, 0.05),
         }
         return {

@@ -13,7 +13,8 @@ silent cue
 
 Roughness is measured from the coordinates alone, whatever the sensor records of a pulse: it is the *anchor*, which is
 never silent and by which the others are tested. Penetration is measured from the coordinates, too. On sparse clouds it
-knows more than roughness does, so it is not tested by it: it is silent only where it says one thing everywhere.
+knows more than roughness does, so it is not tested by it: it is silent only where it says one thing everywhere, or where
+the caller knows that nothing can be below a point (a raster has one height a cell).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ __all__ = ["ANCHOR", "CueInformation", "informative_cues"]
 
 _Floats = NDArray[np.float32]
 
+_NONE: Mapping[str, str] = {}
 #: Name of the cue that is never silent.
 ANCHOR = "roughness"
 #: Cues from coordinates, which are silent only where they are constant, and the share of cells within `_CONSTANT` of
@@ -62,7 +64,11 @@ class CueInformation:
 
 
 def informative_cues(
-    ratings: Mapping[str, _Floats], among: NDArray[np.bool_], *, independent: Collection[str] = ()
+    ratings: Mapping[str, _Floats],
+    among: NDArray[np.bool_],
+    *,
+    independent: Collection[str] = (),
+    known_silent: Mapping[str, str] = _NONE,
 ) -> CueInformation:
     """Return which cues separate roofs from trees, each tested by the others.
 
@@ -77,10 +83,14 @@ def informative_cues(
         Cells that are roof or tree.
     independent : collection of str
         Cues that know more than the others, which are silent only where they say the same everywhere.
+    known_silent : mapping of str to str
+        Reason by cue, of cues that cannot carry information.
     """
+    ratings = {name: rating for name, rating in ratings.items() if name not in known_silent}
     untested = _GEOMETRIC | set(independent)
     values = {name: np.where(among, rating, np.float32(np.nan))[among] for name, rating in ratings.items()}
-    silent = {name: "the points do not hold it" for name, rating in values.items() if not np.isfinite(rating).any()}
+    silent = dict(known_silent)
+    silent |= {name: "the points do not hold it" for name, rating in values.items() if not np.isfinite(rating).any()}
     for name in sorted(untested - {ANCHOR} - silent.keys()):
         if name in values and _is_constant(values[name]):
             silent[name] = "it says the same everywhere"

@@ -8,6 +8,8 @@ square
 point spacing
     Typical distance between neighbouring points where there are any: the side of the area that one point has to
     itself, metres.
+lattice
+    Points in rows and columns, one above each node at most: the cells of a raster.
 
 No array of the size of the cloud is made.
 """
@@ -24,9 +26,13 @@ from numpy.typing import NDArray
 from ...core.kernels import kernel
 from .raster import Frame, Grid
 
-__all__ = ["Statistic", "point_counts", "point_spacing", "spacing_of_counts"]
+__all__ = ["Statistic", "is_lattice", "point_counts", "point_spacing", "spacing_of_counts"]
 
 _Coordinates = NDArray[np.float64]
+
+#: Metres: half the side of the square whose points are tested for a lattice. Nodes per point of a lattice with holes, at
+#: most; a scanned cloud has hundreds. Fewest points by which a lattice is recognised.
+_TESTED, _NODES_PER_POINT, _FEWEST_NODES = 16.0, 4, 50
 
 #: How the squares are summarised: the *mean* of all covered ones; their *median*, which overlapping flight strips and
 #: half covered borders do not affect; or the square of the *median-point*, for points that cover little, as roofs do.
@@ -78,6 +84,24 @@ def spacing_of_counts(counts: NDArray[np.int64], square: float, statistic: Stati
         return float(square / math.sqrt(np.median(covered)))
     ordered = np.sort(covered)
     return float(square / math.sqrt(ordered[np.searchsorted(np.cumsum(ordered), int(covered.sum()) / 2)]))
+
+
+def is_lattice(x: _Coordinates, y: _Coordinates) -> bool:
+    """Return whether the points around the middle one of the arrays are a lattice.
+
+    Examples
+    --------
+    >>> x, y = (values.ravel() for values in np.meshgrid(np.arange(0.25, 8, 0.5), np.arange(0.25, 8, 0.5)))
+    >>> is_lattice(x, y), is_lattice(x + 0.1 * np.sin(y), y)
+    (True, False)
+    """
+    if not len(x):
+        return False
+    middle = len(x) // 2
+    near = (np.abs(x - x[middle]) < _TESTED) & (np.abs(y - y[middle]) < _TESTED)
+    places = np.unique(np.stack([x[near], y[near]], axis=1), axis=0)
+    nodes = len(np.unique(places[:, 0])) * len(np.unique(places[:, 1]))
+    return np.count_nonzero(near) == len(places) >= max(_FEWEST_NODES, nodes / _NODES_PER_POINT)
 
 
 @kernel

@@ -67,3 +67,10 @@ def test_penetration_is_not_tested_by_the_roughness_of_a_sparse_cloud():
     """Roughness misleads where a window holds few points: on knox-small it contradicted penetration, and was wrong."""
     ratings = {"penetration": rating(-0.8, 0.3), ANCHOR: rating(0.1, -0.2)}
     assert informative_cues(ratings, HIGH).used == tuple(ratings)
+
+
+def test_a_cue_that_cannot_know_is_silent_with_its_reason():
+    ratings = {ANCHOR: rating(-0.6, 0.7), "penetration": rating(-0.8, 0.2)}
+    found = informative_cues(ratings, HIGH, known_silent={"penetration": "it is a raster"})
+    assert found.used == (ANCHOR,)
+    assert found.silent == {"penetration": "it is a raster"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from naive import density as naive_density
 
-from roofbench.scenes.geodata.density import point_counts, point_spacing
+from roofbench.scenes.geodata.density import is_lattice, point_counts, point_spacing
 from roofbench.scenes.geodata.raster import Grid
 
 EXTENT = (0.0, 0.0, 40.0, 30.0)
@@ -53,3 +53,14 @@ def test_without_a_point_in_the_extent_there_is_no_spacing(statistic):
     x, y = lattice(0.5)
     assert point_spacing(x, y, (100, 100, 200, 200), statistic=statistic) is None
     assert point_spacing(np.empty(0), np.empty(0), EXTENT, statistic=statistic) is None
+
+
+def test_rasters_are_lattices_and_scans_are_not():
+    x, y = lattice(0.5)
+    rng = np.random.default_rng(1)
+    kept = rng.random(len(x)) < 0.5
+    assert is_lattice(x, y)
+    assert is_lattice(x[kept], y[kept])
+    assert not is_lattice(np.append(x, x), np.append(y, y))  # two heights at each place
+    assert not is_lattice(np.round(rng.uniform(0, 40, 5000), 2), np.round(rng.uniform(0, 30, 5000), 2))
+    assert not is_lattice(np.empty(0), np.empty(0))
