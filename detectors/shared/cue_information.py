@@ -13,8 +13,8 @@ silent cue
 
 Roughness is measured from the coordinates alone, whatever the sensor records of a pulse: it is the *anchor*, which is
 never silent and by which the others are tested. Penetration is measured from the coordinates, too. On sparse clouds it
-knows more than roughness does, so it is not tested by it: it is silent only where it says one thing everywhere, or where
-the caller knows that nothing can be below a point (a raster has one height a cell).
+knows more than roughness does, so it is not tested by it: it is silent only where it says one thing everywhere, or
+where the caller knows that nothing can be below a point (a raster has one height a cell).
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ __all__ = ["Statistic", "is_lattice", "point_counts", "point_spacing", "spacing_
 
 _Coordinates = NDArray[np.float64]
 
-#: Metres: half the side of the square whose points are tested for a lattice. Nodes per point of a lattice with holes, at
-#: most; a scanned cloud has hundreds. Fewest points by which a lattice is recognised.
+#: Metres: half the side of the square whose points are tested for a lattice. Most nodes per point of a lattice with
+#: holes (a scanned cloud has hundreds). Fewest points by which a lattice is recognised.
 _TESTED, _NODES_PER_POINT, _FEWEST_NODES = 16.0, 4, 50
 
 #: How the squares are summarised: the *mean* of all covered ones; their *median*, which overlapping flight strips and
