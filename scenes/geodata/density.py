@@ -101,7 +101,8 @@ def is_lattice(x: _Coordinates, y: _Coordinates) -> bool:
     near = (np.abs(x - x[middle]) < _TESTED) & (np.abs(y - y[middle]) < _TESTED)
     places = np.unique(np.stack([x[near], y[near]], axis=1), axis=0)
     nodes = len(np.unique(places[:, 0])) * len(np.unique(places[:, 1]))
-    return np.count_nonzero(near) == len(places) >= max(_FEWEST_NODES, nodes / _NODES_PER_POINT)
+    single = int(np.count_nonzero(near)) == len(places)
+    return single and len(places) >= max(_FEWEST_NODES, nodes / _NODES_PER_POINT)
 
 
 @kernel
