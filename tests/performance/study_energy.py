@@ -237,7 +237,7 @@ def draw(found):
     for panel in panels[len(found) :]:
         panel.set_axis_off()
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    figure.legend(handles, labels, loc="outside upper center", ncols=3, fontsize=9)
     figure.supxlabel("energy above the lowest state of the scene, plus 1", fontsize=10)
     figure.supylabel("object quality, %", fontsize=10)
     figure.savefig(IMAGES / "mpp-energy-quality.png", dpi=100)
