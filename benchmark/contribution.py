@@ -6,7 +6,7 @@ one vector file for each scene, named as the folder of the blind scene.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,10 +16,13 @@ from ..detectors.checks import checked_output
 from ..detectors.external.precomputed import Precomputed, file_stem, unknown_files
 from ..scenes.folder import SCENE_FILES, open_scene, save_scene
 from ..scenes.scene import Scene
+from .analysis.report_contents import newest_runs
 from .identity.recipes import SceneRecipe
+from .store.records import RunRow
+from .store.writer import Store
 from .suite import DetectorEntry, Suite
 
-__all__ = ["blind_scenes", "contribution_problems", "contribution_suite"]
+__all__ = ["blind_scenes", "contribution_problems", "contribution_suite", "runs_beside"]
 
 
 def blind_scenes(suite: Suite, folder: Path, *, overwrite: bool = False) -> Iterator[tuple[Path, Scene]]:
@@ -50,6 +53,12 @@ def blind_scenes(suite: Suite, folder: Path, *, overwrite: bool = False) -> Iter
 def contribution_suite(suite: Suite, folder: Path, *, label: str = "") -> Suite:
     """Return the suite with the footprints of a folder as its only detector."""
     return replace(suite, detectors=(DetectorEntry(Precomputed(folder=str(folder), label=label)),))
+
+
+def runs_beside(store: Store, contributed: Sequence[RunRow]) -> list[RunRow]:
+    """Return the newest stored runs of other detectors on the scenes of a contribution."""
+    scenes, labels = {row.scene_key for row in contributed}, {row.label for row in contributed}
+    return [row for row in newest_runs(store) if row.scene_key in scenes and row.label not in labels]
 
 
 def contribution_problems(suite: Suite, folder: Path) -> Iterator[tuple[str, str]]:

@@ -167,16 +167,11 @@ def _write(path: Path | None, overwrite: bool, text: str) -> None:
 
 def _self_test(suite: Suite, options: RunOptions, **how: Any) -> SelfTest:
     """Measure a suite twice with different seeds, the second time without stored results, and test the gate on it."""
-    from ..benchmark.analysis.self_test import self_test
-    from ..benchmark.suite import DetectorEntry
+    from ..benchmark.analysis.self_test import self_test, with_other_seeds
 
     console = messages(options.quiet)
     first, _ = measure_suite(suite, options, console)
-    fresh = tuple(
-        DetectorEntry(entry.detector, tuple(max(entry.seeds) + 1 + number for number in range(len(entry.seeds))))
-        for entry in suite.detectors
-    )
     with tempfile.TemporaryDirectory(prefix="roofbench-") as folder:
         apart = replace(options, store=Path(folder) / "self-test.sqlite")
-        second, _ = measure_suite(replace(suite, detectors=fresh), apart, console)
+        second, _ = measure_suite(with_other_seeds(suite), apart, console)
     return self_test(first, second, **how)

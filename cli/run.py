@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
@@ -25,16 +25,6 @@ from .options import (
     WordsArgument,
 )
 from .progress import run_progress
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rich.console import Console
-
-    from ..benchmark.analysis.results import Leaderboard
-    from ..benchmark.plan import KeyedEvaluator
-    from ..benchmark.store.records import RunRow
-    from ..benchmark.store.writer import Store
 
 __all__ = ["run"]
 
@@ -85,6 +75,7 @@ def run(
     from ..benchmark.store.writer import Store
     from ..benchmark.suite import suite_of_words
     from ..core.output import make_folder_for
+    from ..reports.html_report import write_run_report
     from ..reports.leaderboard_text import print_unsuccessful, show_leaderboards, write_leaderboards
     from ..reports.plan_text import format_plan
 
@@ -131,7 +122,12 @@ def run(
         if not no_report and any(entry.scenes for board in boards for entry in board.entries):
             page = (output or options.store.parent) / "report.html"
             evaluated = list(zip(plan.evaluators, boards, strict=True))
-            written += _write_report(page, opened, result.rows, suite.name, evaluated, console)
+            if write_run_report(page, opened, result.rows, suite=suite.name, evaluated=evaluated):
+                written.append(page)
+            else:
+                console.print(
+                    f"{page} is no report of roofbench and was not replaced: name a folder by --output", markup=False
+                )
         show_leaderboards(boards, form, table_console(), wide=wide)
         unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
         print_unsuccessful([*unsuccessful_runs(result.rows), *unevaluated], console)
@@ -142,23 +138,3 @@ def run(
             raise typer.Exit(3)
         if not any(entry.scenes for board in boards for entry in board.entries):
             raise typer.Exit(4)
-
-
-def _write_report(
-    page: Path,
-    store: Store,
-    rows: Sequence[RunRow],
-    suite: str,
-    evaluated: list[tuple[KeyedEvaluator, Leaderboard]],
-    console: Console,
-) -> list[Path]:
-    """Write the report and return its path; a file of that name that is no report is left alone, with a message."""
-    from ..benchmark.analysis.report_contents import fill_report
-    from ..reports.html_report import is_report, write_report
-
-    if page.exists() and not is_report(page):
-        console.print(f"{page} is no report of roofbench and was not replaced: name a folder by --output", markup=False)
-        return []
-    filled = fill_report(store, rows, title=f"Suite {suite}", evaluated=evaluated)
-    write_report(filled, page, overwrite=True)
-    return [page]

@@ -104,8 +104,7 @@ def score(
 
 def _contributed(store: Store, suite: Suite, folder: Path, label: str) -> tuple[list[RunRow], list[RunRow]]:
     """Run the footprints of a folder; return the other stored rows of the same scenes, and theirs."""
-    from ..benchmark.analysis.report_contents import newest_runs
-    from ..benchmark.contribution import contribution_suite
+    from ..benchmark.contribution import contribution_suite, runs_beside
     from ..benchmark.execution.executors import Execution
     from ..benchmark.execution.runner import run_plan
     from ..benchmark.plan import make_plan, plan_content
@@ -116,10 +115,7 @@ def _contributed(store: Store, suite: Suite, folder: Path, label: str) -> tuple[
     store.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
     with run_progress(plan, messages()) as report:
         result = run_plan(plan, store, execution=Execution(jobs=1), progress=report)
-    keys = {run.identity.scene_key for run in plan.runs}
-    labels = {row.label for row in result.rows}
-    others = [row for row in newest_runs(store) if row.scene_key in keys and row.label not in labels]
-    return others, list(result.rows)
+    return runs_beside(store, result.rows), list(result.rows)
 
 
 def _check(suite: Suite, folder: Path) -> None:

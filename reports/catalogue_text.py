@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import fill, shorten
+from textwrap import fill
 
 from ..benchmark.catalogue import Entry
 from ..core.parameters import Parameter, parameter_text
@@ -24,14 +24,16 @@ def catalogue_table(entries: Sequence[Entry]) -> Table:
 
 
 def format_entries(entries: Sequence[Entry], width: int) -> str:
-    """Return one line for each entry, no longer than `width`: all facts where there is room, else the meaning alone."""
+    """Return a line for each entry with all facts where `width` has room, else its whole meaning beside or below it."""
     text = catalogue_table(entries).to_text()
     if max(map(len, text.splitlines())) <= width:
         return text
     longest = max(len(entry.name) for entry in entries)
-    room = max(20, width - longest - 2)
+    if 2 * longest > width:
+        return "\n".join(f"{entry.name}\n{_indented(entry.meaning, width)}" for entry in entries)
     return "\n".join(
-        f"{entry.name:<{longest}}  {shorten(entry.meaning, room, placeholder=' ...')}" for entry in entries
+        fill(f"{entry.name:<{longest}}  {entry.meaning}", width, subsequent_indent=" " * (longest + 2))
+        for entry in entries
     )
 
 

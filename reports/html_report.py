@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from itertools import groupby
@@ -19,8 +20,12 @@ import jinja2
 from markupsafe import Markup, escape
 
 from ..benchmark.analysis.published import Comparison, checks
+from ..benchmark.analysis.report_contents import fill_report
 from ..benchmark.analysis.report_data import Report
 from ..benchmark.analysis.results import Cell, Entry, Leaderboard
+from ..benchmark.plan import KeyedEvaluator
+from ..benchmark.store.records import RunRow
+from ..benchmark.store.writer import Store
 from ..core.output import whole_file
 from ..core.package import VERSION
 from ..evaluators.base import Index
@@ -34,7 +39,7 @@ from .overlay_json import report_json
 from .sensitivity import sensitivity_figure
 from .sweep_text import break_down_text
 
-__all__ = ["html_report", "is_report", "write_report"]
+__all__ = ["html_report", "is_report", "write_report", "write_run_report"]
 
 _MOST_MATRIX_ROWS = 300
 #: Panels in one sensitivity figure.
@@ -376,3 +381,18 @@ def write_report(filled: Report, path: Path, *, level: float = 0.8, overwrite: b
     with whole_file(path, overwrite=overwrite) as scratch:
         scratch.write_bytes(content)
     return len(content)
+
+
+def write_run_report(
+    path: Path,
+    store: Store,
+    rows: Sequence[RunRow],
+    *,
+    suite: str,
+    evaluated: Sequence[tuple[KeyedEvaluator, Leaderboard]],
+) -> bool:
+    """Write the report of a run over an older report; a file of that name that is none stays, and False is returned."""
+    if path.exists() and not is_report(path):
+        return False
+    write_report(fill_report(store, rows, title=f"Suite {suite}", evaluated=list(evaluated)), path, overwrite=True)
+    return True

@@ -24,11 +24,12 @@ import numpy as np
 
 from ...evaluators.base import Index
 from ..identity.recipes import PluginRecipe
+from ..suite import Suite
 from .baseline import Baseline, Measured
 from .gate import compare
 from .inference import wilson_interval
 
-__all__ = ["ALL_DETECTORS", "FalseAlarms", "SelfTest", "self_test"]
+__all__ = ["ALL_DETECTORS", "FalseAlarms", "SelfTest", "self_test", "with_other_seeds"]
 
 #: Name of the row that counts a null comparison once, whichever detector is called worse.
 ALL_DETECTORS = "all detectors"
@@ -105,6 +106,15 @@ class SelfTest:
         if not self.measurable:
             return 4
         return 0 if all(row.holds for row in self.rows) else 1
+
+
+def with_other_seeds(suite: Suite) -> Suite:
+    """Return the suite with as many other seeds of each detector: the second side of a self-test."""
+    entries = tuple(
+        replace(entry, seeds=tuple(max(entry.seeds) + 1 + number for number in range(len(entry.seeds))))
+        for entry in suite.detectors
+    )
+    return replace(suite, detectors=entries)
 
 
 def self_test(

@@ -10,6 +10,7 @@ debuggers.
 from __future__ import annotations
 
 import concurrent.futures
+import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -90,6 +91,8 @@ def cluster_slot(address: str) -> Iterator[Slot]:
         from distributed import Client
     except ImportError as error:
         raise UnsupportedError("scheduler= needs Dask: pip install 'dask[distributed]'") from error
+    if not re.search(r":\d+/?$", address):  # Client would wait for half a minute before it gives up
+        raise InputError(f"{address!r} is no address of a Dask scheduler: write tcp://HOST:PORT")
     try:
         client = Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:

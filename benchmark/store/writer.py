@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from ...core.digests import canonical
-from ...core.errors import OutputError
+from ...core.errors import OutputError, RoofbenchError
 from ...core.package import BENCHMARK_VERSION
 from ...evaluators.verdict_table import SIDES
 from ..identity.keys import SourceClosure
@@ -34,13 +34,14 @@ class Store(StoreReader):
     Parameters
     ----------
     path : path
-        SQLite file, created where missing.
+        SQLite file, created where missing; removed again where an error of roofbench comes before its first run.
     must_exist : bool
         Raise an error for a missing file; for commands that only read.
     """
 
     def __init__(self, path: str | Path, *, must_exist: bool = False) -> None:
         self.path = Path(path)
+        self._is_new = not self.path.exists()
         self._db = connect(self.path, must_exist=must_exist)
 
     def __enter__(self) -> Self:
@@ -49,7 +50,13 @@ class Store(StoreReader):
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, where: TracebackType | None
     ) -> None:
+        leaves_nothing = self._is_new and isinstance(value, RoofbenchError) and not self._has_runs()
         self.close()
+        if leaves_nothing:  # refused before its first run: a mistyped command makes no file
+            self.path.unlink(missing_ok=True)
+
+    def _has_runs(self) -> bool:
+        return self._db.execute("SELECT 1 FROM runs LIMIT 1").fetchone() is not None
 
     def close(self) -> None:
         """Close the file."""

@@ -1,6 +1,7 @@
 """``roofbench list`` and ``roofbench info``: what there is, each name with its meaning."""
 
 import json
+import re
 
 import pytest
 from harness.command_line import roofbench
@@ -12,16 +13,18 @@ from roofbench.scenes.builtin import hamlet
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_entry_has_a_name_and_a_meaning_in_one_line(kind, tmp_path, monkeypatch):
+def test_every_entry_has_a_name_and_its_whole_meaning_at_80_columns(kind, tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    lines = roofbench("list", kind, folder=tmp_path).stdout.splitlines()
+    text = roofbench("list", kind, folder=tmp_path).stdout
+    assert max(map(len, text.splitlines())) <= 80
     found = entries(kind)
-    assert len(lines) == len(found) > 0
-    assert max(map(len, lines)) <= 80
-    for line, entry in zip(lines, found, strict=True):
-        assert line.startswith(entry.name)
+    blocks = re.split(r"\n(?! )", text.rstrip("\n"))
+    assert len(blocks) == len(found) > 0
+    for block, entry in zip(blocks, found, strict=True):
         assert entry.meaning
-        assert "\n" not in entry.meaning
+        words = block.replace("-\n", "- ").split()
+        assert words[0] == entry.name
+        assert "".join(words).endswith("".join(entry.meaning.split()))
 
 
 @pytest.mark.parametrize("kind", KINDS)

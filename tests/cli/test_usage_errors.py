@@ -40,6 +40,8 @@ MISTAKES = [
     ("scenes fetch ahn4bag", "(did you mean 'ahn4-bag'?)"),
     ("scenes fetch ahn", "(did you mean 'ahn4-bag'?)"),
     ("sweep ndsm hamlet --vary heigth=1,2", "(did you mean 'height'?)"),
+    ("sweep ndsm knox-small --vary scene.slop=1,2", "(did you mean"),
+    ("run hamlet --scheduler nowhere", "'nowhere' is no address of a Dask scheduler: write tcp://HOST:PORT"),
     ("info ndms", "(did you mean 'ndsm'?)"),
     ("detect", "needs DETECTOR (NAME, 'NAME[parameter=value,...]' or FILE.py:CLASS)"),
     ("detect ndsm quick -o a.gpkg", "'quick' is a suite and no scene: 'roofbench run quick' runs it by itself"),
@@ -59,6 +61,7 @@ def test_a_mistake_is_one_sentence(words, sentence, tmp_path):
     assert answer.stderr.count("\n") == 1
     assert len(answer.stderr) < 700
     assert answer.stdout == ""
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_group_without_a_command_shows_its_help():

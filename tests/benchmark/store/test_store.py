@@ -78,6 +78,24 @@ def test_raw_detections_reference_and_indices_come_back_as_they_were(store, outc
         assert table.to_bytes() == direct_table.to_bytes()
 
 
+def test_an_error_before_the_first_run_leaves_no_new_store_behind(tmp_path, outcome):
+    def fail(error, *, records):
+        with Store(tmp_path / "runs.sqlite") as opened:
+            if records:
+                opened.record(identity(), outcome, version="1")
+            raise error
+
+    for error in (InputError("mistyped"), KeyboardInterrupt()):
+        with pytest.raises(type(error)):
+            fail(error, records=False)
+        assert (tmp_path / "runs.sqlite").exists() is isinstance(error, KeyboardInterrupt)
+    (tmp_path / "runs.sqlite").unlink()
+    for records in (True, False):
+        with pytest.raises(InputError):
+            fail(InputError("later"), records=records)
+        assert (tmp_path / "runs.sqlite").exists()
+
+
 def test_a_good_result_is_not_replaced_unless_asked(store, outcome):
     first = store.record(identity(), outcome, version="1")
     assert store.record(identity(), outcome, version="2") == first
