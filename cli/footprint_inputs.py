@@ -28,9 +28,13 @@ class Truth(NamedTuple):
 def read_truth(reference: str, *, building_id: str | None, crs: str | None, evaluation_area: str | None) -> Truth:
     """Read the reference from a vector file or a scene (folder or name), with its evaluation area and pixel grid."""
     from ..core.errors import InputError
+    from ..core.registry import nearest_hint
     from ..scenes.geodata.vector_files import read_footprints, read_polygon
-    from ..scenes.shipped import shipped_or_given
+    from ..scenes.shipped import shipped_names, shipped_or_given
 
+    hint = nearest_hint(reference, shipped_names())
+    if hint and not Path(reference).exists() and reference not in shipped_names():
+        raise InputError(f"{reference}: no such file or scene{hint}")
     if not Path(reference).is_file() and shipped_or_given(reference).is_dir():
         from ..scenes.folder import open_scene
 

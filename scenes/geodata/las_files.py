@@ -313,6 +313,8 @@ def _opened(file: Path) -> Iterator[Any]:
     require_file(file, f"LAS, LAZ or COPC files, for instance {file}/*.laz")
     with file.open("rb") as stream:
         head = stream.read(HEADER_BYTES)
+    if not head:
+        raise InputError(f"{file} is empty: give LAS, LAZ or COPC files")
     if head[:4] != b"LASF":
         raise InputError(
             f"{file} is not a LAS file: it begins with {head[:4]!r} instead of b'LASF'; give LAS, LAZ or COPC files"

@@ -64,6 +64,12 @@ def test_a_mistake_is_one_sentence(words, sentence, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_mistyped_scene_as_reference_is_corrected(tmp_path):
+    (tmp_path / "found.geojson").write_text('{"type": "FeatureCollection", "features": []}')
+    answer = roofbench("evaluate", "found.geojson", "delf", folder=tmp_path, expect=2)
+    assert answer.stderr == "Error: delf: no such file or scene (did you mean 'delft'?)\n"
+
+
 def test_a_group_without_a_command_shows_its_help():
     for group in ("scenes", "plot", "baseline"):
         code, stdout, stderr = run(group)
