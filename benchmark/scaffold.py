@@ -71,7 +71,7 @@ def _require_free(template: Template, name: str) -> None:
     kinds = {"detector": DETECTORS.names, "evaluator": EVALUATORS.names, "suite": suite_names}
     kind = "detector" if template == "plugin-package" else template
     if name in kinds[kind]():
-        raise ParameterError(f"a {kind} called {name!r} exists already: choose another name")
+        raise ParameterError(f"{name!r} is already the name of another {kind}: choose a different one")
 
 
 def _files(template: Template, name: str) -> Iterator[tuple[Path, str]]:
