@@ -144,9 +144,14 @@ def tiles_over(extent: _Extent, side: float) -> list[Tile]:
     >>> [tile.core[:2] for tile in tiles_over((100, 0, 600, 400), 512)]
     [(0, 0), (512, 0)]
     """
-    columns = range(math.floor(extent[0] / side), math.ceil(extent[2] / side))
-    rows = range(math.floor(extent[1] / side), math.ceil(extent[3] / side))
-    return [Tile(row, column, side) for row in rows for column in columns]
+    (west, east), (south, north) = (_indices(extent[axis], extent[axis + 2], side) for axis in (0, 1))
+    return [Tile(row, column, side) for row in range(south, north) for column in range(west, east)]
+
+
+def _indices(low: float, high: float, side: float) -> tuple[int, int]:
+    """Return the first tile and the one after the last along an axis; the quotient may round past a border."""
+    first, last = math.floor(low / side), math.ceil(high / side)
+    return first - (first * side > low), last + (last * side < high)
 
 
 def stream_of(seed: int, tile: Tile, detector: Detector) -> np.random.Generator:

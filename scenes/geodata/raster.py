@@ -38,6 +38,14 @@ class Frame(NamedTuple):
     columns: int
 
 
+def _of_one_shape(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return two arrays broadcast to one shape; those that have one stay as they are, which compiled code needs."""
+    first, second = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if first.shape != second.shape:
+        first, second = (np.array(values) for values in np.broadcast_arrays(first, second))
+    return first, second
+
+
 @dataclass(frozen=True)
 class Grid:
     """A north-up grid of square cells; all lengths in metres."""
@@ -110,7 +118,7 @@ class Grid:
 
     def cells(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Return the flat cell index of each point and whether it lies on the grid (index 0 where it does not)."""
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        x, y = _of_one_shape(x, y)
         flat, inside = np.empty(x.shape, dtype=np.intp), np.empty(x.shape, dtype=bool)
         # In parts, so that many points do not need several arrays of their size at once.
         for start in range(0, len(x) if x.ndim else 0, _CHUNK):
@@ -219,7 +227,7 @@ class Elevation:
         # numba takes a while to load, and evaluating footprints does not sample.
         from .sampling import bilinear
 
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        x, y = _of_one_shape(x, y)
         grid = self.grid
         sampled: NDArray[np.float64] = bilinear(self.values, grid.west, grid.north, grid.gsd, x.ravel(), y.ravel())
         return sampled.reshape(x.shape)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from roofbench.detectors.mpp.mpp_detector import MPP
@@ -32,6 +32,7 @@ coordinate = st.floats(-1e4, 1e4)
 
 
 @given(st.tuples(coordinate, coordinate), st.tuples(coordinate, coordinate), st.floats(16, 700))
+@example((0.0, -5e-324), (0.0, -1.0), 16.0)
 def test_every_centre_has_one_owner_also_beyond_the_scene(corner, centre, side):
     whole = (*corner, corner[0] + 900, corner[1] + 700)
     owners = [tile for tile in tiles_over(whole, side) if tile.owns(np.array([centre]), whole)[0]]
