@@ -287,8 +287,9 @@ class _Columns:
             )
         if self._colour is not None and header.software != _SOFTWARE:
             part = self._colour[self._first : self._filled]
-            if len(part) and part.max() <= 255:
-                part *= 257
+            for bands in (part[:, :3], part[:, 3:]):  # near infrared may have another depth
+                if bands.size and bands.max() <= 255:
+                    bands *= 257
         self._first = self._filled
 
     def cloud(self) -> PointCloud:

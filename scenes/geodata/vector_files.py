@@ -220,7 +220,8 @@ def write_layers(
     with whole_file(file, overwrite=overwrite) as scratch, plain_target(scratch) as plain:
         for number, (layer, (geometries, table)) in enumerate(layers.items()):
             columns = storable_columns(table, driver, file)
-            if driver == "GPKG" and layer.lower().startswith(("gpkg", "sqlite")):
+            # GDAL keeps some beginnings for itself, and takes no sign as the first letter.
+            if driver == "GPKG" and (layer.lower().startswith(("gpkg", "sqlite")) or not layer[:1].isalnum()):
                 layer = f"layer_{layer}"
             if driver == "Parquet":
                 write_parquet(plain, geometries, columns, crs)

@@ -227,3 +227,10 @@ def test_a_column_of_geoparquet_that_cannot_be_converted_is_left_out(tmp_path):
     footprints = read_footprints(file)
     assert len(footprints) == 3
     assert footprints.attributes["n"].tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize("name", ["-dash", "[1]", "~t", "$HOME", "_a", "1"])
+def test_a_geopackage_may_have_any_first_letter(tmp_path, name):
+    file = tmp_path / f"{name}.gpkg"
+    write_footprints(Footprints.of(SQUARES, crs="EPSG:25832"), file)
+    assert len(read_footprints(file)) == 3
