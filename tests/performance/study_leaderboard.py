@@ -1,4 +1,4 @@
-"""One leaderboard of every detector, the tools of others included: docs/results/leaderboard.md.
+"""One leaderboard of every detector, the tools of others included.
 
 Run by hand: ``python tests/performance/study_leaderboard.py ../shared/scenes -o board -j 1``. It imports the real
 scenes of that folder (once; the DEM comes from the ground filter, never from classes), adds the scenes of the suite
