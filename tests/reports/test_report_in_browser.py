@@ -42,10 +42,10 @@ def show(driver, tmp_path):
 
 
 def requested(driver):
-    """Return what the page asked for, but for itself and for data within it."""
+    """Return what the page asked for, but for itself, data within it, and the browser's own start page."""
     messages = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
     urls = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
-    return [url for url in urls if not url.startswith(("file:", "data:"))]
+    return [url for url in urls if not url.startswith(("file:", "data:", "chrome:"))]
 
 
 def names(driver):
