@@ -34,7 +34,8 @@ class Store(StoreReader):
     Parameters
     ----------
     path : path
-        SQLite file, created where missing; removed again where an error of roofbench comes before its first run.
+        SQLite file, created where missing; removed again where neither a run nor a plan was stored, or where an error
+        of roofbench comes before its first run.
     must_exist : bool
         Raise an error for a missing file; for commands that only read.
     """
@@ -50,13 +51,26 @@ class Store(StoreReader):
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, where: TracebackType | None
     ) -> None:
-        leaves_nothing = self._is_new and isinstance(value, RoofbenchError) and not self._has_runs()
+        refused = isinstance(value, RoofbenchError)
+        unused = refused or (value is None and not self._has_plans())
+        leaves_nothing = self._is_new and unused and not self._has_runs() and self._is_open_here_only()
         self.close()
-        if leaves_nothing:  # refused before its first run: a mistyped command makes no file
+        if leaves_nothing:  # a mistyped command or a dry run makes no file
             self.path.unlink(missing_ok=True)
 
     def _has_runs(self) -> bool:
         return self._db.execute("SELECT 1 FROM runs LIMIT 1").fetchone() is not None
+
+    def _has_plans(self) -> bool:
+        return self._db.execute("SELECT 1 FROM plans LIMIT 1").fetchone() is not None
+
+    def _is_open_here_only(self) -> bool:
+        """Return whether no other process has the file open: only then can it leave write-ahead logging."""
+        self._db.execute("PRAGMA busy_timeout = 0")
+        try:
+            return bool(self._db.execute("PRAGMA journal_mode = DELETE").fetchone()[0] == "delete")
+        except sqlite3.OperationalError:
+            return False
 
     def close(self) -> None:
         """Close the file."""

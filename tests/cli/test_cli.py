@@ -54,7 +54,10 @@ def test_nothing_measured_is_exit_code_4(cli, misbehaving, tmp_path):
     assert "bare has no reference and is left out" in result.stdout
 
 
-def test_a_dry_run_lists_what_would_run_and_why_the_rest_is_stored(cli, misbehaving):
+def test_a_dry_run_lists_what_would_run_and_why_the_rest_is_stored(cli, misbehaving, tmp_path):
+    before = sorted(tmp_path.iterdir())
+    assert "1 to run" in cli("run", "hamlet[seed=1]", "-d", misbehaving, "--dry-run").stdout
+    assert sorted(tmp_path.iterdir()) == before
     cli("run", "hamlet[seed=1]", "-d", misbehaving, "-j", 0)
     listed = cli("run", "hamlet[seed=1]", "hamlet[seed=2]", "-d", misbehaving, "--dry-run").stdout
     assert "stored   misbehaving  hamlet-1  seed 0: stored as run 1" in listed

@@ -96,6 +96,23 @@ def test_an_error_before_the_first_run_leaves_no_new_store_behind(tmp_path, outc
         assert (tmp_path / "runs.sqlite").exists()
 
 
+def test_a_new_store_without_run_and_plan_is_removed_unless_another_process_has_it_open(tmp_path, outcome):
+    path = tmp_path / "runs.sqlite"
+    with Store(path):
+        pass
+    assert list(tmp_path.iterdir()) == []
+    with Store(path) as opened:
+        opened.save_plan("little", "roofbench run", {})
+    assert path.exists()
+    path.unlink()
+    with Store(path):
+        other = Store(path)
+    other.record(identity(), outcome, version="1")
+    other.close()
+    with Store(path) as opened:
+        assert len(list(opened.runs())) == 1
+
+
 def test_a_good_result_is_not_replaced_unless_asked(store, outcome):
     first = store.record(identity(), outcome, version="1")
     assert store.record(identity(), outcome, version="2") == first
