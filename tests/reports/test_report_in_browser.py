@@ -9,6 +9,7 @@ import pytest
 from builders.report_builder import make_report
 from harness.browser import chromium
 
+from roofbench.benchmark.analysis.results import UnsuccessfulRun
 from roofbench.reports.html_report import html_report
 
 HOSTILE = (
@@ -201,6 +202,21 @@ def test_hostile_names_do_no_harm(show):
     assert shown == HOSTILE[1]
     assert driver.find_element("css selector", "#detectors .text").get_attribute("textContent") == HOSTILE[0]
     assert HOSTILE[0] in driver.find_element("id", "detail").text
+
+
+def test_links_and_drawings_in_names_and_reasons_do_no_harm(show):
+    link, drawing = "javascript:window.harmed=true", """'><svg onload="window.harmed=true"></svg></script>"""
+    report = make_report(labels=(link, drawing), scenes=(drawing, link), title=link)
+    failure = UnsuccessfulRun(
+        status="failed", label=link, scene=drawing, seed=0, reason=f"{drawing} {HOSTILE[0]}", command=link
+    )
+    driver = show(html_report(replace(report, boards=(replace(report.boards[0], unsuccessful=(failure,)),))))
+    click_on(driver, "FP")
+    assert driver.execute_script("return window.harmed") is None
+    assert driver.get_log("browser") == []
+    assert requested(driver) == []
+    assert not driver.find_elements("css selector", "[onload], [href^='javascript:'], [src^='javascript:']")
+    assert failure.reason in driver.find_element("id", "unsuccessful").get_attribute("textContent")
 
 
 def test_a_report_without_scenes_has_no_map(show):
