@@ -39,9 +39,16 @@ def file_figure(comparison: FileComparison, *, title: str) -> Figure:
     if files.count <= _MOST_DRAWN:
         return verdict_figure(_with_verdicts(comparison.evaluation, sides, files, (0, 1)), title=title)
     detected, reference = (store.objects.centres for store in files.stores)
-    right = reference[sides[1].where("TP")]
-    every = [reference[sides[1].where("TP", "FN")], detected[sides[0].where("FP")]]
-    heading = f"{shortened(title, 150)}\nobject quality, TP/(TP+FP+FN), by cell"
+    evaluator = comparison.evaluation.evaluator
+    correct, wrong = (
+        [kind.key for kind in evaluator.kinds_of("reference") if kind.counts_as == counted]
+        for counted in ("correct", "wrong")
+    )
+    false = [kind.key for kind in evaluator.kinds_of("detection") if kind.counts_as == "wrong"]
+    right = reference[sides[1].where(*correct)]
+    every = [reference[sides[1].where(*correct, *wrong)], detected[sides[0].where(*false)]]
+    ratio = f"{'+'.join(correct)} / ({' + '.join([*correct, *false, *wrong])})"
+    heading = f"{shortened(title, 150)}\nobject quality, {ratio}, by cell"
     return _cell_figure([right], every, heading, "object quality (%)", ("viridis", (0, 100)))
 
 

@@ -91,7 +91,7 @@ def test_a_name_that_is_no_name_is_refused(name, tmp_path):
 
 def test_a_name_that_is_taken_is_refused(tmp_path):
     for template, name in (("detector", "ndsm"), ("evaluator", "threshold-free"), ("suite", "quick")):
-        with pytest.raises(ParameterError, match="exists already"):
+        with pytest.raises(ParameterError, match="is already the name of another"):
             write_template(template, name, tmp_path / name)
 
 
