@@ -113,7 +113,8 @@ def test_no_message_of_the_library_names_an_option():
 
     root = Path(roofbench.__file__).parent
     allowed = re.compile(
-        r"roofbench [\w -]+|ogrinfo|saga_cmd|git|var\(--|BASELINE --format|\"grass\", |rev-parse|--porcelain|archive|\"--seed\"|-P:"
+        r"roofbench [\w -]+|ogrinfo|saga_cmd|git|var\(--|BASELINE --format|\"grass\", |"
+        r"rev-parse|--porcelain|archive|\"--seed\"|-P:"
     )
     found = [
         f"{path.relative_to(root)}:{number}: {line.strip()}"
