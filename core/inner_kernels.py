@@ -69,11 +69,12 @@ def compiles_inner() -> bool:
 
 def reduce(result: Any) -> tuple[Any, ...]:
     """Return the compiled form of an inner kernel as what can be pickled."""
+    code = result._asdict()["library"]
     description = result.fndesc
     description.typemap = description.calltypes = None
     return (
-        result.library.name,
-        result.library._final_module.as_bitcode(),
+        code.name,
+        code._final_module.as_bitcode(),
         description,
         result.environment,
         result.signature,

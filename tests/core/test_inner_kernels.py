@@ -97,7 +97,7 @@ def test_no_machine_code_is_made_for_what_only_kernels_call(tmp_path, monkeypatc
 
 def has_wrapper(compiled):
     (result,) = compiled.overloads.values()
-    names = [function.name for function in result.library.get_defined_functions()]
+    names = [function.name for function in result._asdict()["library"].get_defined_functions()]
     return result.fndesc.llvm_cpython_wrapper_name in names
 
 
