@@ -10,7 +10,7 @@ million footprints). Measured in processes of their own, one after the other:
 - *evaluate*: ``roofbench evaluate --parts`` with the verdicts of all objects as GeoParquet.
 
 Seconds are wall time; *processor* counts those of all processes and threads; memory is that of all processes together.
-Each row is added to ``measured.json`` in the folder; ``--plot FILE`` draws them.
+Each row is added to ``measured.json`` in the folder; ``--plot FILE`` draws the last one of each size.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def plotted(rows, file):
     figure = Figure(figsize=(5, 4), layout="constrained")
     axes = figure.subplots()
     for what, mark, colour in (("evaluate", "o", "#0072b2"), ("join", "s", "#d55e00")):
-        points = sorted((row["size"], row["processor"]) for row in rows if row["what"] == what)
+        points = sorted({row["size"]: row["processor"] for row in rows if row["what"] == what}.items())
         axes.plot(*zip(*points, strict=True), marker=mark, color=colour, label=f"{what} ({len(points)} sizes)")
     size, seconds = max((row["size"], row["processor"]) for row in rows if row["what"] == "evaluate")
     axes.plot([size / 1000, size], [seconds / 1000, seconds], color="grey", linestyle=":", label="in proportion")
