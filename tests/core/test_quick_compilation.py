@@ -59,7 +59,12 @@ def test_the_types_of_scalar_functions_are_those_of_numba():
         called = context.resolve_value_type(function)
         for one in kinds:
             for arguments in [(one,)] if function is abs else [(one, two) for two in kinds]:
-                own = home._call_type(called, context, arguments, {})
+                try:
+                    own = home._call_type(called, context, arguments, {})
+                except errors.TypingError:  # older versions of numba have no max(int64, bool)
+                    with pytest.raises(errors.TypingError):
+                        home._call_type_of_scalars(called, context, arguments, {})
+                    continue
                 implementation = called._impl_keys[own.args]
                 for _ in range(2):
                     assert home._call_type_of_scalars(called, context, arguments, {}) == own

@@ -122,7 +122,8 @@ def command(folder, output):
 
 
 def finished_tiles(output):
-    return len(list(work_folder(output).glob("*_*"))) if work_folder(output).exists() else 0
+    # A tile that is being written lies in a hidden folder.
+    return len(list(work_folder(output).glob("[!.]*_*"))) if work_folder(output).exists() else 0
 
 
 def test_a_killed_run_resumes_without_loss(folder, tmp_path):
