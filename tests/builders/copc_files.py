@@ -64,5 +64,6 @@ def record(header, cloud):
     points = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
     points.x, points.y, points.z = cloud.x, cloud.y, cloud.z
     for name in ("return_number", "number_of_returns", "intensity", "classification"):
-        points[name] = getattr(cloud, name)
+        if getattr(cloud, name) is not None:
+            points[name] = getattr(cloud, name)
     return points

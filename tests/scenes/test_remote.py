@@ -6,6 +6,8 @@ import threading
 
 import numpy as np
 import pytest
+import shapely
+from builders.copc_files import write_copc
 from builders.town import HOUSES, SIDE, SOUTH, WEST, town
 
 import roofbench as rb
@@ -14,9 +16,10 @@ from roofbench.benchmark.execution.executors import Execution
 from roofbench.benchmark.suite import scenes_of
 from roofbench.core.errors import InputError
 from roofbench.detectors.registry import make_detector
-from roofbench.scenes.folder import open_scene
+from roofbench.scenes.folder import open_scene, write_reference
 from roofbench.scenes.geodata.las_files import write_points
-from roofbench.scenes.geodata.raster_files import write_elevation
+from roofbench.scenes.geodata.raster import Grid, Image
+from roofbench.scenes.geodata.raster_files import write_elevation, write_image
 from roofbench.scenes.importing.tile_index import index_folder
 from roofbench.scenes.remote import copy_of
 
@@ -86,3 +89,58 @@ def test_an_address_without_a_scene_is_one_sentence(tmp_path, monkeypatch, addre
     monkeypatch.setenv("ROOFBENCH_SCENES", str(tmp_path))
     with pytest.raises(InputError, match=address.partition("://")[0]):
         open_scene(address)
+
+
+@pytest.fixture
+def bucket(tiles, monkeypatch):
+    """The address in an object storage on this machine of the town with COPC, an orthoimage and a reference besides."""
+    reason = "object storage is not tested: pip install s3fs 'moto[server]'"
+    pytest.importorskip("s3fs", reason=reason)
+    server = pytest.importorskip("moto.server", reason=reason).ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    boto3 = pytest.importorskip("boto3", reason=reason)
+    whole = town()
+    (tiles / "1 of 3.laz").unlink()
+    east = (WEST + 64, SOUTH, WEST + 128, SOUTH + SIDE)
+    write_copc(tiles / "1 of 3.copc.laz", whole.window(east).points, crs="EPSG:25832")
+    grid = Grid.covering(whole.extent, 1.0)
+    colours = np.random.default_rng(2).integers(1, 255, (3, *grid.shape), dtype=np.uint8)
+    write_image(Image(colours, ("red", "green", "blue"), grid), tiles / "ortho.tif", crs="EPSG:25832")
+    boxes = rb.Footprints.of([shapely.box(*box) for box in HOUSES.values()], crs="EPSG:25832")
+    write_reference(boxes, tiles / "reference.gpkg", "EPSG:25832")
+    index_folder(tiles)
+    server.start()
+    try:
+        for name, value in {
+            "AWS_ENDPOINT_URL": "http://{}:{}".format(*server.get_host_and_port()),
+            "AWS_ACCESS_KEY_ID": "any",
+            "AWS_SECRET_ACCESS_KEY": "any",
+            "AWS_DEFAULT_REGION": "us-east-1",
+        }.items():
+            monkeypatch.setenv(name, value)
+        client = boto3.client("s3")
+        client.create_bucket(Bucket="towns")
+        for file in tiles.iterdir():
+            client.upload_file(str(file), "towns", f"one/{file.name}")
+        yield "s3://towns/one"
+    finally:
+        server.stop()
+
+
+@pytest.mark.filterwarnings("ignore")  # warnings of the libraries of the object storage are theirs
+def test_a_city_in_object_storage_gives_what_its_folder_gives(tiles, bucket, tmp_path):
+    far, near = open_scene(bucket), open_scene(tiles)
+    window = (WEST + 50, SOUTH + 20, WEST + 90, SOUTH + 60)
+    for part, same in ((far.window(window), near.window(window)), (far, near)):
+        assert np.array_equal(part.points.x, same.points.x)
+        assert np.array_equal(part.dem.values, same.dem.values)
+        assert np.array_equal(part.image.values, same.image.values)
+        assert len(part.reference) == len(same.reference) > 0
+    contents = []
+    for address in (bucket, str(tiles)):
+        (recipe,) = scenes_of([address])
+        output = tmp_path / "city.fgb"
+        detect_city(
+            recipe, make_detector("ndsm[cell=0.5]"), output, City(tile=64.0), execution=Execution(jobs=2), overwrite=True
+        )
+        contents.append(output.read_bytes())
+    assert contents[0] == contents[1]
