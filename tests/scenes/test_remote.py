@@ -93,7 +93,7 @@ def test_an_address_without_a_scene_is_one_sentence(tmp_path, monkeypatch, addre
 
 @pytest.fixture
 def bucket(tiles, monkeypatch):
-    """The address in an object storage on this machine of the town with COPC, an orthoimage and a reference besides."""
+    """The town with COPC, an orthoimage and a reference besides, in an object storage on this machine: its address."""
     reason = "object storage is not tested: pip install s3fs 'moto[server]'"
     pytest.importorskip("s3fs", reason=reason)
     server = pytest.importorskip("moto.server", reason=reason).ThreadedMotoServer("127.0.0.1", 0, verbose=False)
@@ -138,9 +138,7 @@ def test_a_city_in_object_storage_gives_what_its_folder_gives(tiles, bucket, tmp
     contents = []
     for address in (bucket, str(tiles)):
         (recipe,) = scenes_of([address])
-        output = tmp_path / "city.fgb"
-        detect_city(
-            recipe, make_detector("ndsm[cell=0.5]"), output, City(tile=64.0), execution=Execution(jobs=2), overwrite=True
-        )
+        output, city, detector = tmp_path / "city.fgb", City(tile=64.0), make_detector("ndsm[cell=0.5]")
+        detect_city(recipe, detector, output, city, execution=Execution(jobs=2), overwrite=True)
         contents.append(output.read_bytes())
     assert contents[0] == contents[1]
