@@ -46,7 +46,7 @@ def test_counts_are_equal_and_areas_agree_to_nine_digits(block, general, matchin
         assert_same(evaluation, naive.evaluate(detected, reference, building, matching=matching))
 
 
-@pytest.mark.parametrize("seed", [2698, 4913, 7300, 9706, 11977, 12354, 22587, 31092, 46128])
+@pytest.mark.parametrize("seed", [2698, 4913, 7300, 9706, 11977, 12354, 22587, 31092, 36168, 46128, 47148])
 @pytest.mark.parametrize("general", [False, True], ids=["rectangles", "polygons"])
 def test_sets_whose_overlay_in_floating_precision_loses_area(seed, general):
     detected, reference, building = scene(seed, general=general)
