@@ -26,6 +26,7 @@ import typing
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
+from .conditions import Uses, counts_beside, uses_in_words
 from .display import Displayed
 from .errors import ParameterError
 from .registry import nearest_hint
@@ -215,13 +216,13 @@ class Parameterised(Displayed):
     modes : mapping
         Value of the parameter ``mode`` to the defaults that it sets, by parameter; empty for classes without modes.
     used_with : mapping
-        Parameter to other parameters and those values of them beside which it counts (any of them is enough); the
+        Parameter to other parameters and those values or conditions of them beside which it counts (`conditions`); the
         parameters that are absent always count.
     """
 
     shown_by = "reports.notebook_view:parameters_view"
     modes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
-    used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {}
+    used_with: ClassVar[Mapping[str, Uses]] = {}
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
@@ -329,8 +330,7 @@ class Parameterised(Displayed):
         copy = type(self).build({**self.execution_values(), **self.changed(), **values})
         for name in copy.unused():
             if name in values:
-                others = self.used_with[name].items()
-                needed = " or ".join(f"{other}={parameter_text(value)}" for other, found in others for value in found)
+                needed = uses_in_words(self.used_with[name], parameter_text)
                 owner = getattr(self, "name", None) or type(self).__name__
                 raise ParameterError(f"{owner}: {name} has no effect here: it is used with {needed}")
         return copy
@@ -360,11 +360,7 @@ class Parameterised(Displayed):
 
     def unused(self) -> list[str]:
         """Return the names of the parameters that have no effect beside the values of others."""
-        return [
-            name
-            for name, others in self.used_with.items()
-            if all(getattr(self, other) not in values for other, values in others.items())
-        ]
+        return [name for name, uses in self.used_with.items() if not counts_beside(uses, self.__getattribute__)]
 
     def values(self) -> dict[str, Any]:
         """Return the parameter values by name."""

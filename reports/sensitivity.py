@@ -103,7 +103,7 @@ def _draw_line(
         at, low, high = zip(*spans, strict=True)
         panel.fill_between(at, low, high, color=colour, alpha=0.13, linewidth=0)
     panel.plot(x, y, color=colour, linestyle=dash, linewidth=1.5, marker=marker, markersize=4.5)
-    most = max((point.scenes for point in line.points), default=0)
+    most = max([line.scenes, *(point.scenes for point in line.points)])
     for point, height in zip(known, y, strict=True):
         if point.scenes < most:
             panel.annotate(

@@ -147,6 +147,8 @@ class Sensitivity:
         Default value of the detector; None for generator axes.
     left_out : tuple
         Values of the axis that are stored for other scenes only, and hence not on the line.
+    scenes : int
+        Scenes of each value; a point with fewer is undefined on some. 0: as many as the point with the most has.
     break_down : BreakDown, optional
         Where the index passes a level; None when it was not looked for.
     """
@@ -158,6 +160,7 @@ class Sensitivity:
     points: tuple[SensitivityPoint, ...]
     default: Any = None
     left_out: tuple[Any, ...] = ()
+    scenes: int = 0
     break_down: BreakDown | None = None
 
 

@@ -2,8 +2,9 @@
 
 All points of a line are over the same scenes: values that lack some of them are left out of the line, and named.
 
-A stored run lies on an axis of the generator when its preset was changed in that one parameter, and on an axis of its
-detector when that one parameter differs from the default. Unchanged runs of the same scenes give the default's point.
+A stored run lies on an axis of the generator when its preset was changed in that one parameter. Unchanged runs of the
+same scenes give the default's point. Runs of a detector that differ in one parameter alone lie on the axis of that
+parameter; the default need not be among them.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import InputError, RoofbenchError
+from ...core.parameters import parameter_text
 from ...detectors.registry import make_detector
 from ...evaluators.base import Index
 from ...evaluators.registry import make_evaluator
@@ -71,6 +73,7 @@ def stored_sensitivities(
                 points=points,
                 default=default,
                 left_out=left_out,
+                scenes=max(len({row.scene for row in own}) for own in common.values()),
             )
             lines.append(_with_break_down(line, level) if index is indices[0] else line)
     return lines[:_MOST_LINES]
@@ -166,28 +169,46 @@ def _scene_axes(rows: Sequence[RunRow]) -> Iterable[Axis]:
 
 
 def _detector_axes(rows: Sequence[RunRow]) -> Iterable[Axis]:
-    """Yield the axes of the detectors: parameters that differ alone from the default."""
-    plain = {row.detector: row.parameters for row in rows if "[" not in row.label.rpartition("/")[2]}
-    varied: dict[tuple[str, str], dict[Any, list[RunRow]]] = {}
+    """Yield the axes of the detectors: runs that differ in one parameter alone, whatever the others are."""
+    settings = {row.id: dict(row.parameters) for row in rows}
+    own: dict[str, list[RunRow]] = {}
     for row in rows:
-        default = plain.get(row.detector)
-        if default is None:
-            continue
-        changed = {name: value for name, value in row.parameters.items() if default.get(name) != value}
-        if len(changed) == 1:
-            ((name, value),) = changed.items()
-            varied.setdefault((row.detector, name), {}).setdefault(value, []).append(row)
-    for (detector, name), by_value in varied.items():
-        scenes = {row.scene for own in by_value.values() for row in own}
-        default = plain[detector][name]
-        label = detector.rpartition(":")[2]
-        unit, _ = _facts_of(name, detector)
-        same = [
-            row
-            for row in rows
-            if row.detector == detector and row.scene in scenes and row.parameters == plain[detector]
-        ]
-        yield name, unit, default, label, {**by_value, default: same}
+        own.setdefault(row.detector, []).append(row)
+    for detector, found in own.items():
+        names = dict.fromkeys(name for row in found for name in settings[row.id])
+        varied = [name for name in names if len({repr(settings[row.id].get(name)) for row in found}) > 1]
+        for name in varied:
+            lines: dict[str, list[RunRow]] = {}
+            for row in found:
+                others = sorted((other, repr(settings[row.id].get(other))) for other in varied if other != name)
+                lines.setdefault(repr(others), []).append(row)
+            for alike in lines.values():
+                by_value: dict[Any, list[RunRow]] = {}
+                for row in alike:
+                    by_value.setdefault(settings[row.id].get(name), []).append(row)
+                facts = _facts_beside(detector, settings[alike[0].id], name) if len(by_value) > 1 else None
+                if facts is not None:
+                    label, unit, default = facts
+                    yield name, unit, default, label, by_value
+
+
+def _facts_beside(detector: str, parameters: Mapping[str, Any], axis: str) -> tuple[str, str, Any] | None:
+    """Return the label of a line without the parameter of its axis, and the unit and default of that parameter.
+
+    None for a parameter of free text, such as a folder: its values are no points of a line.
+    """
+    short = detector.rpartition(":")[2]
+    try:
+        made = make_detector(detector, parameters)
+    except RoofbenchError:
+        # A plugin that is not loaded, or parameters of an earlier version.
+        return short, "", None
+    rule = made.parameters()[axis]
+    if rule.type is str and not rule.choices:
+        return None
+    others = ",".join(f"{name}={parameter_text(value)}" for name, value in made.changed().items() if name != axis)
+    label = f"{short}[{others}]" if others else short
+    return label, rule.unit, made.defaults()[axis]
 
 
 def _over_common_scenes(

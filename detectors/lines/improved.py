@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.conditions import Uses
 from ...core.parameters import parameter
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
@@ -84,8 +85,10 @@ class Improved(LineDetector):
         },
     }
 
-    used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+    used_with: ClassVar[Mapping[str, Uses]] = {
         **LineDetector.used_with,
+        "adjustment_angle": {"adjustment": ("bases", "longest", "neighbours"), "voting": (True,)},
+        "adjustment_radius": {"adjustment": ("neighbours",)},
         "entropy_level": {"entropy": ("share",)},
         "vote_length": {"voting": (True,)},
         "majority": {"voting": (True,)},
@@ -95,7 +98,7 @@ class Improved(LineDetector):
         "most_edges": {"texture": ("tests",)},
         "area_per_edge": {"texture": ("tests",)},
         "peaks": {"texture": ("tests",)},
-        "peak_ratio": {"texture": ("tests",)},
+        "peak_ratio": ({"texture": ("tests",)}, {"peaks": ("maxima",)}),
     }
 
     entropy_threshold: float = parameter(

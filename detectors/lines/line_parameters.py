@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
+from ...core.conditions import ABOVE_ZERO, Uses
 from ...core.errors import ParameterError
 from ...core.parameters import parameter
 from ..base import Detector
@@ -30,10 +31,12 @@ class LineParameters(Detector):
 
     requires: ClassVar[tuple[str, ...]] = ("points", "brightness")
     halo: ClassVar[float] = 150.0
-    used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+    used_with: ClassVar[Mapping[str, Uses]] = {
         "below_ground": {"ground": ("point-dem",)},
         "ground_tile": {"ground": ("tile-dem", "tile-mode")},
         "tile_pixel": {"ground": ("tile-dem", "tile-mode")},
+        "neighbourhood": {"marking": ("nearest", "squares")},
+        "parallel_angle": {"new_share": (ABOVE_ZERO,)},
     }
 
     mode: str = parameter(

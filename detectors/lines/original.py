@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.conditions import Uses
 from ...core.parameters import parameter
 from .adjustment import adjust_to_neighbours
 from .boxes import Boxes
@@ -41,6 +42,13 @@ class Original(LineDetector):
             "adjustment_share": 1.0,
         },
         "program": {**PROGRAM, "adjustment_reference": "none"},
+    }
+
+    used_with: ClassVar[Mapping[str, Uses]] = {
+        **LineDetector.used_with,
+        "adjustment_angle": {"adjustment_reference": ("longer", "any")},
+        "adjustment_radius": {"adjustment_reference": ("longer", "any")},
+        "adjustment_share": {"adjustment_reference": ("longer", "any")},
     }
 
     adjustment_reference: str = parameter(

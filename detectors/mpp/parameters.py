@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
+from ...core.conditions import ABOVE_ZERO, AT_MOST_ONE, Uses
 from ...core.errors import ParameterError
 from ...core.parameters import Parameterised, execution_option, parameter
 
@@ -31,7 +32,11 @@ def check_sides(owner: str, least: float, largest: float) -> None:
 class MPPParameters(Parameterised):
     """What decides the result of ``mpp``, and the number of threads, which does not."""
 
-    used_with: ClassVar[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+    used_with: ClassVar[Mapping[str, Uses]] = {
+        "roof_price": {"roofs": ("all",)},
+        "roof_step": {"carried_share": (AT_MOST_ONE,)},
+        "texture_limit": {"texture_weight": (ABOVE_ZERO,)},
+        "least_evidence": ({"texture_weight": (ABOVE_ZERO,)}, {"texture_limit": (ABOVE_ZERO,)}),
         "start": {"optimiser": ("rjmcmc",)},
         "effort": {"optimiser": ("rjmcmc",)},
     }

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...core.conditions import GIVEN, Uses
 from ...core.parameters import parameter
 from ...scenes.geodata.density import is_lattice, point_spacing
 from ...scenes.geodata.footprints import Footprints
@@ -50,6 +51,8 @@ _IMAGE, _IMAGE_WEIGHT = "image vegetation", 0.5
 _PENETRATION = "penetration"
 #: Noise of heights, metres, that the threshold of roughness allows for; image matching may have more.
 _LASER_NOISE = 0.12
+#: The thresholds of the cues, each of which may be none.
+_ANY_CUE = dict.fromkeys(("multiple_share", "roughness", "penetration", "ndvi", "green_red"), (GIVEN,))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +62,13 @@ class NDSM(Detector):
     name = "ndsm"
     requires = ("points",)
     halo = 64.0
+    used_with: ClassVar[Mapping[str, Uses]] = {
+        "window": {"roughness": (GIVEN,)},
+        "darkest": {"ndvi": (GIVEN,), "green_red": (GIVEN,)},
+        "smoothing": _ANY_CUE,
+        "most_tree_like": _ANY_CUE,
+        "tolerance": {"outline": ("polygon",)},
+    }
 
     height: float = parameter(
         2.5,

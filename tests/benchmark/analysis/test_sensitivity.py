@@ -106,3 +106,33 @@ def test_the_figure_names_its_marks_and_keeps_break_downs_apart():
     assert len(set(triangles)) == len(triangles) == 2
     (legend,) = figure.legends
     assert {"95 % interval", "80 %", "passes the level"} <= {text.get_text() for text in legend.get_texts()}
+
+
+def test_a_sweep_without_the_default_is_a_line():
+    stored = Stored()
+    for height in (2.0, 3.0, 4.0):
+        stored.add(height / 10, height=height)
+    line = stored.line()
+    assert (line.axis, line.detector, line.default) == ("height", "ndsm", DEFAULTS["height"])
+    assert points_of(line) == [(2.0, 0.2, 1), (3.0, 0.3, 1), (4.0, 0.4, 1)]
+
+
+def test_a_sweep_beside_another_changed_parameter_names_it():
+    stored = Stored()
+    for height in (2.0, 3.0):
+        stored.add(0.5, height=height, opening=2.0)
+    stored.add(0.6, height=3.0)
+    lines = stored_sensitivities(stored.rows, stored.values, KEYED, level=0.8, chosen=["object.quality"])
+    assert [(line.axis, line.detector) for line in lines] == [
+        ("height", "ndsm[opening=2]"),
+        ("opening", "ndsm[height=3]"),
+    ]
+
+
+def test_points_that_are_undefined_on_different_scenes_all_say_their_number():
+    stored = Stored()
+    for height, undefined in ((2.0, 1), (3.0, 2)):
+        for seed in (1, 2):
+            stored.add(None if seed == undefined else 0.5, seed=seed, height=height)
+    (panel,) = sensitivity_figure([stored.line()]).axes
+    assert [text.get_text() for text in panel.texts] == ["n = 1", "n = 1"]
