@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
+from ...scenes.geodata.footprints import Footprints
+from .kept import kept_with_footprints
 
-__all__ = ["meeting_bounds", "meeting_bounds_within"]
+__all__ = ["BoundsTree", "bounds_tree", "meeting_bounds", "meeting_bounds_within"]
 
 #: Children of a node.
 _WIDTH = 8
@@ -25,8 +27,8 @@ _WIDTH = 8
 _CHUNK = 1 << 15
 
 
-class _Tree(NamedTuple):
-    """A packed tree.
+class BoundsTree(NamedTuple):
+    """A packed tree of bounds.
 
     Attributes
     ----------
@@ -42,16 +44,41 @@ class _Tree(NamedTuple):
     level: NDArray[np.int64]
     row: NDArray[np.int64]
 
+    @classmethod
+    def of(cls, bounds: NDArray[np.float64]) -> BoundsTree:
+        """Return the tree of some bounds: xmin, ymin, xmax, ymax, m, shape (n, 4)."""
+        keys = np.empty(len(bounds), dtype=np.uint64)
+        if len(bounds):
+            low, high = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
+            _morton(bounds, low, np.maximum(high - low, 1e-9), keys)
+        row = np.argsort(keys, kind="stable")
+        levels = [np.ascontiguousarray(bounds[row])]
+        while len(levels[-1]) > 1:
+            below = levels[-1]
+            begin = np.arange(0, len(below), _WIDTH)
+            low, high = (
+                reduce.reduceat(below[:, part], begin, axis=0)
+                for reduce, part in ((np.minimum, slice(0, 2)), (np.maximum, slice(2, 4)))
+            )
+            levels.append(np.concatenate([low, high], axis=1))
+        start = np.concatenate([[0], np.cumsum([len(level) for level in levels])]).astype(np.int64)
+        return cls(np.concatenate(levels), start, row)
+
+
+@kept_with_footprints
+def bounds_tree(footprints: Footprints) -> BoundsTree:
+    """Return the tree of the bounds of footprints."""
+    return BoundsTree.of(footprints.bounds)
+
 
 def meeting_bounds(
-    one: NDArray[np.float64], two: NDArray[np.float64], *, most: float, threads: int | None = None
+    one: BoundsTree, two: BoundsTree, *, most: float, threads: int | None = None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Return the pairs (row in `one`, row in `two`) whose bounds share area, sorted.
 
     Parameters
     ----------
-    one, two : ndarray, shapes (n, 4), (m, 4)
-        xmin, ymin, xmax, ymax, m.
+    one, two : BoundsTree
     most : float
         Largest number of pairs.
     threads : int, optional
@@ -65,14 +92,14 @@ def meeting_bounds(
     Examples
     --------
     >>> boxes = np.array([[0.0, 0, 2, 2], [1, 1, 3, 3], [2, 0, 4, 1]])
-    >>> [rows.tolist() for rows in meeting_bounds(boxes[:1], boxes, most=10)]
+    >>> [rows.tolist() for rows in meeting_bounds(BoundsTree.of(boxes[:1]), BoundsTree.of(boxes), most=10)]
     [[0, 0], [0, 1]]
     """
-    return _joined(_planted(one), _planted(two), False, most, threads)
+    return _joined(one, two, False, most, threads)
 
 
 def meeting_bounds_within(
-    bounds: NDArray[np.float64], *, most: float, threads: int | None = None
+    tree: BoundsTree, *, most: float, threads: int | None = None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Return the pairs of rows of one set whose bounds share area, each once, the lower row first; sorted.
 
@@ -81,34 +108,14 @@ def meeting_bounds_within(
     Examples
     --------
     >>> boxes = np.array([[0.0, 0, 2, 2], [1, 1, 3, 3], [2, 0, 4, 1]])
-    >>> [rows.tolist() for rows in meeting_bounds_within(boxes, most=10)]
+    >>> [rows.tolist() for rows in meeting_bounds_within(BoundsTree.of(boxes), most=10)]
     [[0], [1]]
     """
-    tree = _planted(bounds)
     return _joined(tree, tree, True, most, threads)
 
 
-def _planted(bounds: NDArray[np.float64]) -> _Tree:
-    keys = np.empty(len(bounds), dtype=np.uint64)
-    if len(bounds):
-        low, high = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
-        _morton(bounds, low, np.maximum(high - low, 1e-9), keys)
-    row = np.argsort(keys, kind="stable")
-    levels = [np.ascontiguousarray(bounds[row])]
-    while len(levels[-1]) > 1:
-        below = levels[-1]
-        begin = np.arange(0, len(below), _WIDTH)
-        low, high = (
-            reduce.reduceat(below[:, part], begin, axis=0)
-            for reduce, part in ((np.minimum, slice(0, 2)), (np.maximum, slice(2, 4)))
-        )
-        levels.append(np.concatenate([low, high], axis=1))
-    start = np.concatenate([[0], np.cumsum([len(level) for level in levels])]).astype(np.int64)
-    return _Tree(np.concatenate(levels), start, row)
-
-
 def _joined(
-    one: _Tree, two: _Tree, within: bool, most: float, threads: int | None
+    one: BoundsTree, two: BoundsTree, within: bool, most: float, threads: int | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     count = len(one.row)
     found: list[NDArray[np.int64]] = []
@@ -153,45 +160,66 @@ def _morton(
 
 
 @kernel
-def _search(one: _Tree, two: _Tree, begin: int, end: int, within: bool) -> NDArray[np.int64]:
-    """Return row of one x (number of leaves of two) + row of two, of the leaves `begin` to `end` of one."""
+def _search(one: BoundsTree, two: BoundsTree, begin: int, end: int, within: bool) -> NDArray[np.int64]:
+    """Return row of one x (number of leaves of two) + row of two, of the leaves `begin` to `end` of one.
+
+    `_WIDTH` successive leaves go down the tree together, since neighbours meet the same nodes.
+    """
     keys = np.empty(2 * (end - begin) + 16, dtype=np.int64)
     count = 0
     width = len(two.row)
     top = len(two.level) - 2
-    nodes = np.empty(8 * (top + 2), dtype=np.int64)
-    levels = np.empty(8 * (top + 2), dtype=np.int64)
-    for leaf in range(begin, end):
-        xmin, ymin, xmax, ymax = one.boxes[leaf, 0], one.boxes[leaf, 1], one.boxes[leaf, 2], one.boxes[leaf, 3]
-        own = one.row[leaf]
+    nodes, levels = np.empty((2, _WIDTH * (top + 3)), dtype=np.int64)
+    for low in range(begin, end if width else begin, _WIDTH):
+        high = min(low + _WIDTH, end)
+        west, south, east, north = np.inf, np.inf, -np.inf, -np.inf
+        for leaf in range(low, high):
+            west, south = min(west, one.boxes[leaf, 0]), min(south, one.boxes[leaf, 1])
+            east, north = max(east, one.boxes[leaf, 2]), max(north, one.boxes[leaf, 3])
         nodes[0], levels[0], waiting = two.level[top], top, 1
-        if width == 0:
-            waiting = 0
         while waiting > 0:
             waiting -= 1
             node, level = nodes[waiting], levels[waiting]
-            if not (
-                two.boxes[node, 0] < xmax
-                and xmin < two.boxes[node, 2]
-                and two.boxes[node, 1] < ymax
-                and ymin < two.boxes[node, 3]
-            ):
-                continue
-            if level == 0:
-                other = two.row[node]
-                if within and other <= own:
-                    continue
-                if count == len(keys):
-                    larger = np.empty(2 * count, dtype=np.int64)
-                    larger[:count] = keys
-                    keys = larger
-                keys[count] = own * width + other
-                count += 1
-                continue
-            child = two.level[level - 1] + 8 * (node - two.level[level])
-            last = min(child + 8, two.level[level])
+            if level > 0:
+                child = two.level[level - 1] + _WIDTH * (node - two.level[level])
+                last = min(child + _WIDTH, two.level[level])
+                level -= 1
+            else:
+                child, last = node, node + 1  # the tree is one leaf
+            # The last leaf below `child`, and by how much it grows from one child to the next.
+            stride = _WIDTH**level
+            final = (child - two.level[level] + 1) * stride - 1
+            # Written in any case and counted where they meet: these branches are mispredicted too often.
             while child < last:
-                nodes[waiting], levels[waiting] = child, level - 1
-                waiting += 1
+                meets = (
+                    (two.boxes[child, 0] < east)
+                    & (west < two.boxes[child, 2])
+                    & (two.boxes[child, 1] < north)
+                    & (south < two.boxes[child, 3])
+                    & ((final > low) | (not within))  # of one set, each pair is found from its earlier leaf
+                )
+                nodes[waiting], levels[waiting] = child, level
+                waiting += meets
                 child += 1
+                final += stride
+            if level > 0:
+                continue
+            while waiting > 0 and levels[waiting - 1] == 0:
+                waiting -= 1
+                child = nodes[waiting]
+                if count + _WIDTH > len(keys):
+                    larger = np.empty(2 * len(keys), dtype=np.int64)
+                    larger[:count] = keys[:count]
+                    keys = larger
+                box, other = two.boxes[child], two.row[child]
+                for leaf in range(low, min(high, child) if within else high):
+                    meets = (
+                        (box[0] < one.boxes[leaf, 2])
+                        & (one.boxes[leaf, 0] < box[2])
+                        & (box[1] < one.boxes[leaf, 3])
+                        & (one.boxes[leaf, 1] < box[3])
+                    )
+                    own = one.row[leaf]
+                    keys[count] = min(own, other) * width + max(own, other) if within else own * width + other
+                    count += meets
     return keys[:count].copy()

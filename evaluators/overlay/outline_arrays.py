@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from ...scenes.geodata.footprints import Footprints
+from .kept import kept_with_footprints
 
 __all__ = ["Outlines", "outlines_of", "polygons_of"]
 
@@ -45,6 +46,7 @@ class Outlines(NamedTuple):
         return cls(start, points, sign, bounds, area)
 
 
+@kept_with_footprints
 def outlines_of(footprints: Footprints) -> Outlines:
     """Return the outlines of footprints."""
     return Outlines.of(*footprints.rings, footprints.areas)

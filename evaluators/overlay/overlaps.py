@@ -91,11 +91,10 @@ def overlaps_between(detected: Footprints, reference: Footprints) -> Overlaps:
     if not len(detected) or not len(reference):
         return _measured(detected, reference, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
     if max(len(detected), len(reference)) > _MANY_FOOTPRINTS:
-        from .bounds_index import meeting_bounds  # compiled code: a comparison of small files does without
+        from .bounds_index import bounds_tree, meeting_bounds  # compiled code: a comparison of small files does without
 
-        return _measured(
-            detected, reference, *_few(meeting_bounds(detected.bounds, reference.bounds, most=_MOST_PAIRS), detected)
-        )
+        pairs = meeting_bounds(bounds_tree(detected), bounds_tree(reference), most=_MOST_PAIRS)
+        return _measured(detected, reference, *_few(pairs, detected))
     tree = shapely.STRtree(reference.polygons)
     _check_crowd(tree, detected)
     return _measured(detected, reference, *_sorted(*tree.query(detected.polygons)))
@@ -106,11 +105,10 @@ def overlaps_within(footprints: Footprints) -> Overlaps:
     if len(footprints) < 2:
         return _measured(footprints, footprints, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
     if len(footprints) > _MANY_FOOTPRINTS:
-        from .bounds_index import meeting_bounds_within
+        from .bounds_index import bounds_tree, meeting_bounds_within
 
-        return _measured(
-            footprints, footprints, *_few(meeting_bounds_within(footprints.bounds, most=_MOST_PAIRS), footprints)
-        )
+        pairs = meeting_bounds_within(bounds_tree(footprints), most=_MOST_PAIRS)
+        return _measured(footprints, footprints, *_few(pairs, footprints))
     tree = shapely.STRtree(footprints.polygons)
     _check_crowd(tree, footprints)
     first, second = tree.query(footprints.polygons)
@@ -159,9 +157,10 @@ def shared_areas(
     one: Footprints, two: Footprints, first: NDArray[np.int64], second: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Return the area that footprint `first` of one set shares with `second` of the other, m2, shape (n,)."""
-    row_one, row_two = quadrilateral_rows(one)[first], quadrilateral_rows(two)[second]
-    convex = (row_one >= 0) & (row_two >= 0)
     many = max(len(one), len(two)) > _MANY_FOOTPRINTS or len(first) > _MANY_ALL
+    if not many:
+        row_one, row_two = quadrilateral_rows(one)[first], quadrilateral_rows(two)[second]
+        convex = (row_one >= 0) & (row_two >= 0)
     if many or np.count_nonzero(~convex) > _MANY_OUTLINES:
         # Compiled code: a comparison of small files does without.
         from .outline_arrays import outlines_of

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.tasks import run_tasks
-from .bounds_index import meeting_bounds, meeting_bounds_within
+from .bounds_index import BoundsTree, meeting_bounds, meeting_bounds_within
 from .groups import Members
 from .outline_arrays import Outlines, polygons_of
 from .outline_overlaps import shared_by_outlines, shared_within
@@ -179,10 +179,11 @@ def _pairs_of_part(
     stores: Sequence[OutlineStore], couples: Sequence[tuple[int, int]], number: int
 ) -> dict[str, NDArray[Any]]:
     parts = [store.part(number) for store in stores]
+    trees = [BoundsTree.of(part.outlines.bounds) for part in parts]
     found: dict[str, NDArray[Any]] = {}
     for place, (store, part) in enumerate(zip(stores, parts, strict=True)):
         rows, outlines = part.rows, part.outlines
-        first, second = _few(meeting_bounds_within(outlines.bounds, most=_MOST_PAIRS), store)
+        first, second = _few(meeting_bounds_within(trees[place], most=_MOST_PAIRS), store)
         owned = _owned(store, outlines, outlines, first, second, number)
         first, second = first[owned], second[owned]
         area = shared_within(outlines, first, second)
@@ -190,16 +191,24 @@ def _pairs_of_part(
         inside = rows[first[shares]], rows[second[shares]], area[shares]
         found |= {f"{place}.{name}": column for name, column in zip(_WITHIN, inside, strict=True)}
     for couple in couples:
-        columns = _between(stores[couple[0]], parts[couple[0]], parts[couple[1]], number)
+        one, two = couple
+        pairs = _few(meeting_bounds(trees[one], trees[two], most=_MOST_PAIRS), stores[one])
+        columns = _between(stores[one], parts[one], parts[two], pairs, number)
         name = f"{couple[0]}-{couple[1]}"
         found |= {f"{name}.{column}": values for column, values in zip(_BETWEEN, columns, strict=True)}
     return found
 
 
-def _between(store: OutlineStore, part: StoredPart, other: StoredPart, number: int) -> tuple[NDArray[Any], ...]:
-    """Return the columns of the pairs of one part of two sides."""
+def _between(
+    store: OutlineStore,
+    part: StoredPart,
+    other: StoredPart,
+    meeting: tuple[NDArray[np.int64], NDArray[np.int64]],
+    number: int,
+) -> tuple[NDArray[Any], ...]:
+    """Return the columns of the pairs of one part of two sides; `meeting` are those whose bounds meet."""
     one, two = part.outlines, other.outlines
-    first, second = _few(meeting_bounds(one.bounds, two.bounds, most=_MOST_PAIRS), store)
+    first, second = meeting
     owned = _owned(store, one, two, first, second, number)
     first, second = first[owned], second[owned]
     area = shared_by_outlines(one, two, first, second)

@@ -61,19 +61,22 @@ def repaired(
 
     leave_out(shapely.is_missing(geometries), "no geometry")
     leave_out(shapely.is_empty(geometries), "empty")
-    polygonal = np.isin(shapely.get_type_id(geometries), (3, 6, 7))
+    types = shapely.get_type_id(geometries)
+    polygonal = np.isin(types, (3, 6, 7))
     for row in np.flatnonzero(kept & ~polygonal):
         repairs.append(Repair(int(row), f"not a polygon: {geometries[row].geom_type}", "left out"))
     kept &= polygonal
     bounds = shapely.bounds(geometries)
     finite = np.isfinite(bounds).all(axis=1)
+    areas = np.zeros(len(geometries))
     with np.errstate(over="ignore", invalid="ignore"):
-        finite[kept] &= np.isfinite(shapely.area(geometries[kept]))
+        areas[kept] = shapely.area(geometries[kept])
+        finite &= np.isfinite(areas)
     leave_out(~finite, "coordinates that are not finite")
     leave_out(finite & (np.abs(bounds) > _FARTHEST).any(axis=1), f"coordinates beyond {_FARTHEST:g} m")
 
     suspect = np.flatnonzero(kept)[~_are_valid(geometries[kept])]
-    suspect = np.union1d(suspect, np.flatnonzero(kept & (shapely.get_type_id(geometries) == 7)))
+    suspect = np.union1d(suspect, np.flatnonzero(kept & (types == 7)))
     for row in suspect:
         collection = geometries[row].geom_type == "GeometryCollection"
         problem = "a collection of geometries" if collection else shapely.is_valid_reason(geometries[row])
@@ -83,11 +86,11 @@ def repaired(
         usable = not geometries[row].is_empty
         repairs.append(Repair(int(row), problem, "repaired" if usable else "left out"))
         kept[row] = usable
-    single = kept & (shapely.get_type_id(geometries) == 6) & (shapely.get_num_geometries(geometries) == 1)
+        types[row], areas[row] = shapely.get_type_id(geometries[row]), shapely.area(geometries[row])
+    several = np.flatnonzero(kept & (types == 6))
+    single = several[shapely.get_num_geometries(geometries[several]) == 1]
     geometries[single] = shapely.get_geometry(geometries[single], 0)
-    flat = np.zeros(len(geometries), dtype=bool)
-    flat[kept] = ~(shapely.area(geometries[kept]) > 0)
-    leave_out(flat, "zero area")
+    leave_out(~(areas > 0), "zero area")
     repairs.sort(key=lambda repair: repair.id)
     return geometries[kept], tuple(repairs), kept
 

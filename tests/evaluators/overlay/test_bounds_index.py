@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import roofbench as rb
-from roofbench.evaluators.overlay.bounds_index import meeting_bounds, meeting_bounds_within
+from roofbench.evaluators.overlay.bounds_index import BoundsTree, meeting_bounds, meeting_bounds_within
 
 
 def boxes(rng, count, extent):
@@ -25,16 +25,17 @@ def test_pairs_are_all_that_share_area(seed, counts):
     one, two = (boxes(rng, count, 60) for count in counts)
     if counts[0]:
         one[0] = (-1e7, -1e7, 1e7, 1e7)  # the outline of a country among houses
-    for found, expected in zip(meeting_bounds(one, two, most=1e6), plain(one, two), strict=True):
+    trees = BoundsTree.of(one), BoundsTree.of(two)
+    for found, expected in zip(meeting_bounds(*trees, most=1e6), plain(one, two), strict=True):
         assert found.tolist() == expected.tolist()
     first, second = plain(one, one)
-    within = meeting_bounds_within(one, most=1e6)
+    within = meeting_bounds_within(trees[0], most=1e6)
     assert [rows.tolist() for rows in within] == [first[first < second].tolist(), second[first < second].tolist()]
 
 
 def test_threads_change_nothing_and_a_crowd_is_given_up(monkeypatch):
     monkeypatch.setattr("roofbench.evaluators.overlay.bounds_index._CHUNK", 7)
-    one, two = (boxes(np.random.default_rng(seed), 300, 60) for seed in (1, 2))
+    one, two = (BoundsTree.of(boxes(np.random.default_rng(seed), 300, 60)) for seed in (1, 2))
     alone, both = (meeting_bounds(one, two, most=1e6, threads=threads) for threads in (1, 2))
     assert all((a == b).all() for a, b in zip(alone, both, strict=True))
     assert meeting_bounds(one, two, most=10) is None
