@@ -44,6 +44,8 @@ _KNOWN_STEP, _KNOWN_VALLEY = 0.6, 0.5
 
 #: Fractions of a cell that places of the lattice are rounded to.
 _FRACTIONS = 1024
+#: Decimals of the sides of rectangles, metres.
+_DECIMALS = 6
 
 
 class WallRule(NamedTuple):
@@ -76,8 +78,8 @@ class Wall(NamedTuple):
 
 def most_walls(rectangles: Rectangles, grid: Grid) -> NDArray[np.int64]:
     """Return how many party walls there is room for in each rectangle, shape (n,): houses have a least width."""
-    sides = np.sort(np.asarray(rectangles).reshape(-1, 5)[:, 2:4] * grid.gsd, axis=1)
-    room = np.floor(sides[:, 1] / _NARROWEST + 1e-9).astype(np.int64) - 1
+    sides = np.sort(np.round(np.asarray(rectangles).reshape(-1, 5)[:, 2:4] * grid.gsd, _DECIMALS), axis=1)
+    room = np.floor(sides[:, 1] / _NARROWEST).astype(np.int64) - 1
     return np.where(sides[:, 0] < _SHALLOWEST, 0, np.maximum(room, 0))
 
 
@@ -99,9 +101,10 @@ def party_walls(
     """
     place = corners(rectangle)[0] * grid.gsd
     first, second = place[1] - place[0], place[3] - place[0]
-    if np.hypot(*first) < np.hypot(*second):
-        first, second = second, first
-    length, depth = float(np.hypot(*first)), float(np.hypot(*second))
+    # Rounded, so that a side of exactly so many stations has as many in every window of a scene.
+    length, depth = (round(float(np.hypot(*side)), _DECIMALS) for side in (first, second))
+    if length < depth:
+        first, second, length, depth = second, first, depth, length
     if length < 2 * _NARROWEST or depth < _SHALLOWEST:
         return []
     u, v = first / length, second / depth

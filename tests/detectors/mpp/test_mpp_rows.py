@@ -98,6 +98,26 @@ def test_walls_turn_with_the_row():
         np.testing.assert_allclose(np.abs(wall.along), [0.5, math.sqrt(0.75)], atol=1e-12)
 
 
+def test_walls_do_not_depend_on_the_cell_that_a_window_begins_with():
+    """Sides of n + 1/2 cells end on a station, where rounding of the corners would decide."""
+    rng = np.random.default_rng(1)
+    count, size, far = 150, 140, 2000
+    sides = np.column_stack([rng.integers(18, 110, count), rng.integers(14, 40, count)]) + 0.5
+    turned = np.column_stack([rng.uniform(60, 80, (count, 2)), sides, rng.uniform(0, np.pi, count)])
+    height = rng.integers(300, 500, (size, size)).astype(np.uint16).repeat(4, axis=0)[:size]
+    state = np.full((size, size), HIGH, np.uint8)
+    rows, columns = far, far - 7
+    around = Grid(GRID.west - columns * GRID.gsd, GRID.north + rows * GRID.gsd, GRID.gsd, size + rows, size + columns)
+    padded = [np.pad(cells, ((rows, 0), (columns, 0))) for cells in (height, state)]
+    for one in turned:
+        moved = one + np.array([columns, rows, 0, 0, 0])
+        here = party_walls(one, height, state, GRID, PROBABLE)
+        there = party_walls(moved, *padded, around, PROBABLE)
+        assert len(here) == len(there)
+        for wall, same in zip(here, there, strict=True):
+            assert np.allclose(wall.point + np.array([columns, rows]), same.point, atol=1e-6)
+
+
 def u(x, y):
     """Metres along a row at 30 degrees through (65, 40)."""
     return (x - 65) * math.cos(math.radians(30)) + (y - 40) * math.sin(math.radians(30)) + 18
