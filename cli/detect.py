@@ -26,6 +26,7 @@ from .options import (
     TimeLimitOption,
     VerboseOption,
 )
+from .tiles import detect_tiles, say_left_out
 
 if TYPE_CHECKING:
     from ..detectors.base import Detector
@@ -113,7 +114,6 @@ def detect(
     if tile is not None:
         from ..benchmark.execution.city import City
         from .command import RunOptions
-        from .tiles import detect_tiles
 
         if output is None or steps is not None:
             raise ParameterError("tile= writes footprints alone: set output=, and take steps= of a part of the scene")
@@ -146,6 +146,8 @@ def detect(
         count = _write_steps(chosen, place, seed, steps, overwrite)
         if not quiet:
             say(f"{steps}: {count} pictures")
+    if say_left_out(place.left_out, "which computes the scene again"):
+        raise typer.Exit(3)
 
 
 def _refuse_without_tiles(halo: float | None, scheduler: str | None, jobs: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..detectors.tiling import Tile
     from .command import RunOptions
 
-__all__ = ["detect_tiles"]
+__all__ = ["detect_tiles", "say_left_out"]
 
 
 def detect_tiles(
@@ -41,8 +41,6 @@ def detect_tiles(
         )
     if not options.quiet:
         _say(result, output, recipe.name)
-    for problem in result.left_out:
-        say(f"left out: {problem}")
     if result.failed:
         for tile, reason in result.failed.items():
             say(f"failed: tile {tile.label}: {reason}")
@@ -50,13 +48,21 @@ def detect_tiles(
             f"{len(result.failed)} of {result.tiles} tiles failed and are missing in {output}: repair their files, and "
             "give the same command with --overwrite, which computes these tiles alone",
         )
-    if result.left_out:
-        say(
-            f"{len(result.left_out)} files are no part of the scene: repair them, index it again, and repeat the "
-            "command with --overwrite, which computes the tiles that they change",
-        )
-    if result.failed or result.left_out:
+    if say_left_out(result.left_out, "which computes the tiles that they change") or result.failed:
         raise typer.Exit(3)
+
+
+def say_left_out(problems: Sequence[str], consequence: str) -> bool:
+    """Report files that are no part of a scene; return whether there are any."""
+    for problem in problems:
+        say(f"left out: {problem}")
+    if problems:
+        files = "1 file is" if len(problems) == 1 else f"{len(problems)} files are"
+        say(
+            f"{files} no part of the scene: repair or remove what is left out, index the folder again, and repeat the "
+            f"command with --overwrite, {consequence}"
+        )
+    return bool(problems)
 
 
 def _say(result: CityResult, output: Path, name: str) -> None:

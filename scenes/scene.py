@@ -278,6 +278,11 @@ class Scene(Displayed):
             files = [self.content_hash]
         return hashlib.sha256(repr((extent, self.crs, files)).encode()).hexdigest()
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Files of its folder that are no part of the scene, with the reason."""
+        return tuple(self.facts.get("left_out", ()))
+
     def for_detection(self) -> Scene:
         """Return the scene as a detector may see it: measurements under a neutral name, and nothing else.
 

@@ -156,7 +156,7 @@ def detect_city(
     files = {job.tile: job.file for job in work.jobs if job.tile not in failed}
     joined = join_outcomes(files, detector, work.scene.crs)
     write_footprints(joined.footprints, output, overwrite=overwrite)
-    left_out = tuple(work.scene.facts.get("left_out", ()))
+    left_out = work.scene.left_out
     if not failed and not left_out:
         remove_tiles(work.folder)
     return CityResult(

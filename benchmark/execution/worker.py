@@ -19,7 +19,7 @@ import numpy as np
 import shapely
 from shapely import Geometry
 
-from ...core.errors import MissingInputError, RoofbenchError
+from ...core.errors import InputError, MissingInputError, RoofbenchError
 from ...core.memory import highest_memory, reset_highest_memory
 from ...core.plain_values import plain_value
 from ...detectors.base import Detector
@@ -104,6 +104,8 @@ def execute(
         detector = detector if detector is not None else task.detector.detector()
         if evaluators is None:
             evaluators = [recipe.evaluator() for recipe in task.evaluators]
+        if task.part is None:
+            _refuse_incomplete(scene)
         is_city = task.part is None and task.scene.tile > 0
         record = describe(scene, is_city=is_city) if task.describe_scene else None
         whole = scene
@@ -160,6 +162,14 @@ def execute(
         scores=tuple(result for result in results if isinstance(result, Score)),
         score_failures=tuple(result for result in results if isinstance(result, ScoreFailure)),
     )
+
+
+def _refuse_incomplete(scene: Scene) -> None:
+    """Refuse to score a scene of which files are missing: their buildings would count as not detected."""
+    if scene.left_out:
+        count, first = len(scene.left_out), scene.left_out[0]
+        files = "one file is no part of the scene" if count == 1 else f"{count} files are no part of the scene, first"
+        raise InputError(f"{files}: {first}; repair or remove what is left out, and index the folder again")
 
 
 def _window_key(recipe: SceneRecipe, part: TilePart) -> str:

@@ -4,14 +4,16 @@ A scene folder is mirrored to N x N copies, every second one turned over so that
 written as a folder of tiles (WORK/town, kept for the next call). A detector then runs on the whole in memory and tile
 by tile, with the same measured values. Printed for each detector: the share of footprints of the whole that the tiles
 have, too (to a thousandth of their area), those centred farther than one halo from every seam by themselves, the time
-of both, and the peak memory of a worker. ``--only-tiles`` leaves the whole out, for towns that do not fit in memory:
-12 x 13 copies of Delft (265 x 230 m) are 3 x 3 km and 130 million points.
+of both, and the peak memory of a worker. The others are listed with their distance from the nearest seam, and drawn in
+WORK/DETECTOR-differences.png, those that lie together in one panel. ``--only-tiles`` leaves the whole out, for towns
+that do not fit in memory: 12 x 13 copies of Delft (265 x 230 m) are 3 x 3 km and 130 million points.
 """
 
 import argparse
 import time
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import shapely
 from mirrored_town import mirror
@@ -27,15 +29,17 @@ from roofbench.scenes.geodata.vector_files import read_footprints, write_footpri
 
 #: Share of the area by which a footprint may differ from its match.
 SAME = 1e-3
+#: Metres within which footprints that differ are drawn in one panel, and the highest number of panels.
+NEAR, PANELS = 5.0, 12
 
 
-def matched(whole, tiled):
-    """Return which footprints of the whole the tiles have, too."""
+def apart(whole, tiled):
+    """Return by how much each footprint of the whole differs from its nearest of the tiles, in shares of its area."""
     first, second = shapely.STRtree(tiled.polygons).query(whole.polygons, predicate="intersects")
-    apart = shapely.area(shapely.symmetric_difference(whole.polygons[first], tiled.polygons[second]))
+    differ = shapely.area(shapely.symmetric_difference(whole.polygons[first], tiled.polygons[second]))
     least = np.full(len(whole), np.inf)
-    np.minimum.at(least, first, apart / whole.areas[first])
-    return least < SAME
+    np.minimum.at(least, first, differ / whole.areas[first])
+    return least
 
 
 def share(rows):
@@ -46,6 +50,41 @@ def share(rows):
 def from_seams(centres, side):
     """Return the distance of centres from the nearest line of the grid of tiles, metres."""
     return np.minimum(centres % side, side - centres % side).min(axis=1)
+
+
+def groups_of(polygons):
+    """Return the rows of polygons that lie together, the largest group first."""
+    near = shapely.union_all(shapely.buffer(polygons, NEAR))
+    rows = [np.flatnonzero(shapely.intersects(polygons, part)) for part in shapely.get_parts(near)]
+    return sorted(rows, key=len, reverse=True)
+
+
+def draw(whole, tiled, rows, side, path):
+    """Draw the footprints of some rows of the whole (filled) and what the tiles have there (outlines)."""
+    groups = groups_of(whole.polygons[rows])[:PANELS]
+    columns = min(4, len(groups))
+    lines = -(-len(groups) // columns)
+    figure, axes = plt.subplots(lines, columns, figsize=(3 * columns, 3 * lines), squeeze=False, layout="constrained")
+    for one, group in zip(axes.flat, groups, strict=False):
+        west, south, east, north = shapely.total_bounds(whole.polygons[rows[group]])
+        reach = max(east - west, north - south) / 2 + 10
+        x, y = (west + east) / 2, (south + north) / 2
+        panel = shapely.box(x - reach, y - reach, x + reach, y + reach)
+        for footprints, style in ((whole, {"facecolor": "0.8"}), (tiled, {"facecolor": "none", "edgecolor": "C3"})):
+            for polygon in footprints.polygons[shapely.intersects(footprints.polygons, panel)]:
+                for part in shapely.get_parts(polygon):
+                    one.fill(*np.array(part.exterior.xy), **style)
+        for line in np.arange(np.floor((x - reach) / side) + 1, (x + reach) / side) * side:
+            one.axvline(line, color="C0")
+        for line in np.arange(np.floor((y - reach) / side) + 1, (y + reach) / side) * side:
+            one.axhline(line, color="C0")
+        one.set(xlim=(x - reach, x + reach), ylim=(y - reach, y + reach), aspect="equal", xticks=[], yticks=[])
+        seam = from_seams(whole.centres[rows[group]], side).min()
+        one.set_title(f"{x:.0f} {y:.0f}, {seam:.0f} m from a seam", fontsize=8)
+    for one in axes.flat[len(groups) :]:
+        one.remove()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
 
 
 def main():
@@ -86,11 +125,22 @@ def main():
         whole = detect(scene, detector.replaced(result.measured.parameters), stream=np.random.default_rng([0]))
         print(f"  the whole: {time.perf_counter() - started:.0f} s, {len(whole)} footprints", flush=True)
         write_footprints(whole, options.work / f"{detector.name}-whole.gpkg", overwrite=True)
-        same = matched(whole, read_footprints(output))
+        tiled = read_footprints(output)
+        differ = apart(whole, tiled)
+        same = differ < SAME
         far = from_seams(whole.centres, options.tile) > halo
         near = from_seams(whole.centres, options.tile) <= halo
         for label, rows in (("all", np.ones(len(whole), dtype=bool)), ("beyond a halo", far), ("within a halo", near)):
             print(f"  {label}: {same[rows].sum()} of {rows.sum()} identical ({share(same[rows])})", flush=True)
+        others = np.flatnonzero(~same)
+        for row in others:
+            (x, y), seam = whole.centres[row], from_seams(whole.centres[[row]], options.tile)[0]
+            print(
+                f"  differs by {min(differ[row], 9.99):.2f} of {whole.areas[row]:.0f} m2 at {x:.0f} {y:.0f}, "
+                f"{seam:.0f} m from a seam"
+            )
+        if len(others):
+            draw(whole, tiled, others, options.tile, options.work / f"{detector.name}-differences.png")
     print(f"peak memory of this process {highest_memory() / 1e6:.0f} MB")
 
 

@@ -159,6 +159,34 @@ def test_a_broken_file_fails_the_run_and_keeps_the_other_tiles(tmp_path):
     assert not finished(tmp_path / "a.sqlite")
 
 
+def test_a_file_of_another_zone_fails_the_run_and_is_named(tmp_path):
+    whole = town()
+    folder, (west, south, east, north) = tmp_path / "town", whole.extent
+    folder.mkdir()
+    for number, bounds in enumerate([(west, south, west + 128, north), (west + 128, south, east, north)]):
+        write_points(whole.window(bounds).points, folder / f"{number}.laz", crs=whole.crs)
+    content = (folder / "1.laz").read_bytes()
+    write_points(whole.points, folder / "1.laz", crs="EPSG:25833")
+    boxes = rb.Footprints.of([shapely.box(*box) for box in HOUSES.values()], crs=whole.crs)
+    write_reference(boxes, folder / "reference.gpkg", whole.crs)
+    assert run("scenes", "index", folder)[0] == 3
+    (tmp_path / "suite.toml").write_text(SUITE)
+    tiled = ("run", tmp_path / "suite.toml", "-j", 0, "--store", tmp_path / "a.sqlite")
+    (tmp_path / "untiled.toml").write_text(SUITE.replace("tile = 64\n", ""))
+    untiled = ("run", tmp_path / "untiled.toml", "-j", 0, "--store", tmp_path / "b.sqlite")
+    for words in (tiled, untiled):
+        code, _, message = run(*words)
+        assert code == 3
+        assert "one file is no part of the scene: 1.laz is left out" in message
+    kept = finished(tmp_path / "a.sqlite")
+    assert kept
+    (folder / "1.laz").write_bytes(content)
+    assert run("scenes", "index", folder)[0] == 0
+    for words in (tiled, untiled):
+        assert run(*words)[0] == 0
+    assert not finished(tmp_path / "a.sqlite")
+
+
 def test_the_next_window_is_read_while_a_tile_is_computed(place, tmp_path, monkeypatch):
     started, taken = [], []
     start, take = worker.ReadAhead.start, worker.ReadAhead.take
