@@ -8,9 +8,11 @@ each: wall time, processor time of all processes, the highest memory of a worker
 second, and the checksum of the output, which must not depend on the mode. WORK/city.png shows time and memory against
 the number of copies on logarithmic axes, with a line of equal time per copy.
 
+At the end all lines are printed as a Markdown table, with the processor seconds for a million points.
+
 ``--kill`` stops the run with two workers of that size when half of the tiles are done, by the signal KILL, and starts
 it again: the result must be the same, and no finished tile is computed again. ``--peers`` adds other programs on the
-scene itself.
+scene itself; what is not installed is named.
 """
 
 import argparse
@@ -18,6 +20,7 @@ import csv
 import hashlib
 import os
 import resource
+import shutil
 import signal
 import socket
 import subprocess
@@ -157,6 +160,8 @@ def killed(town, copies, options):
 
 def peers(options, points):
     """Run other programs and ours on the scene itself, from files to footprints, and print points per second."""
+    if shutil.which("pdal") is None:
+        print("pdal: not installed on this machine, not measured")
     for name in PEERS:
         output = options.work / "peer.gpkg"
         command = [sys.executable, "-m", "roofbench", "detect", name, options.scene, "-o", output, "--overwrite", "-q"]
@@ -172,6 +177,23 @@ def peers(options, points):
             f"{name}: {seconds:.1f} s, {processor_time() - before:.1f} CPU s, {points / seconds:.0f} points/s",
             flush=True,
         )
+
+
+def in_markdown(rows):
+    """Return the measured runs as a table."""
+    lines = [
+        "| copies | points | tiles | mode | clock, s | CPU, s | CPU s for a million points | memory of a worker "
+        "| of the driver | footprints |",
+        "|--:|--:|--:|---|--:|--:|--:|--:|--:|--:|",
+    ]
+    for row in rows:
+        millions = int(row["points"]) / 1e6
+        lines.append(
+            f"| {row['copies']} | {millions:.1f} million | {row['tiles']} | {row['mode']} | {row['seconds']} | "
+            f"{row['cpu_seconds']} | {float(row['cpu_seconds']) / millions:.1f} | {row['worker_mb']} MB | "
+            f"{row['driver_mb']} MB | {row['footprints']} |"
+        )
+    return "\n".join(lines)
 
 
 def finished(table):
@@ -239,6 +261,7 @@ def main():
     with table.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     plot(rows, options.work / "city.png")
+    print(in_markdown(rows))
     for copies in dict.fromkeys(row["copies"] for row in rows):
         sums = {row["sha256"] for row in rows if row["copies"] == copies}
         print(f"{copies} copies: {'same bits in all modes' if len(sums) == 1 else f'DIFFERENT: {sums}'}")
