@@ -20,6 +20,7 @@ from ...core.errors import InputError, UnsupportedError
 from ...core.inputs import require_file
 from ...core.plain_paths import plain_path
 from .crs import file_crs, named_crs, require_metric
+from .damaged_outlines import refuse_damaged
 from .degrees import refuse_degrees
 from .footprints import Footprints
 from .ogr_layers import quiet
@@ -98,8 +99,11 @@ class FootprintStream:
         from .simple_rings import plain_outlines  # loading the compiled code takes a moment
 
         first = 0
+        missing: list[NDArray[np.int64]] = []
         for batch in self.batches([] if self.building_id is None else [self.building_id]):
             column = self.wkb(batch)
+            if column.null_count:
+                missing.append(first + np.flatnonzero(column.is_null().to_numpy(zero_copy_only=False)))
             plain = plain_outlines(*wkb_buffers(column))
             rest = np.ones(len(column), dtype=bool)
             rest[plain.rows] = False
@@ -118,6 +122,8 @@ class FootprintStream:
                 labels = labels.take(_arrow().array(outlines.ids - first))
             yield outlines, labels
             first += len(batch)
+        if self.layer is not None and missing:
+            refuse_damaged(self.file, self.layer, np.concatenate(missing), first)
         if first < self.count:
             raise InputError(
                 f"{self.file} is truncated: {first} of the {self.count} features that its header announces are there; "

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError, OutputError
 from ...core.inputs import require_file
+from .colour_depth import stretch_to_16_bit
 from .crs import parse_crs
 from .las_headers import (
     HEADER_BYTES,
@@ -288,8 +289,7 @@ class _Columns:
         if self._colour is not None and header.software != _SOFTWARE:
             part = self._colour[self._first : self._filled]
             for bands in (part[:, :3], part[:, 3:]):  # near infrared may have another depth
-                if bands.size and bands.max() <= 255:
-                    bands *= 257
+                stretch_to_16_bit(bands)
         self._first = self._filled
 
     def cloud(self) -> PointCloud:

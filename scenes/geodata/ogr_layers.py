@@ -69,7 +69,7 @@ def read_layer(path: Path, name: str) -> Layer:
 def _read(path: Path, name: str) -> Layer:
     import pyogrio
     import pyogrio.raw
-    from pyogrio.errors import GeometryError
+    from pyogrio.errors import CRSError, GeometryError
 
     source: Path | bytes = path
     encoding: str | None = None
@@ -83,6 +83,10 @@ def _read(path: Path, name: str) -> Layer:
                 raise
             source = _virtual(path, name)
         except UnboundLocalError:  # pyogrio fails on a CRS that PROJ reads and cannot write as WKT
+            if source is not path:
+                raise
+            source = _virtual(path, name, with_crs=False)
+        except CRSError:  # a description of a CRS that ends early
             if source is not path:
                 raise
             source = _virtual(path, name, with_crs=False)

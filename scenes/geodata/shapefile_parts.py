@@ -17,6 +17,11 @@ __all__ = ["damaged_rows", "refuse_broken_parts"]
 
 #: Bytes of the headers of .shp and .shx.
 _HEADER = 100
+#: What to do about an index that does not fit.
+_RESTORE = (
+    "copy the file again with all its parts, or delete the .shx and restore it, for instance with ogrinfo --config "
+    "SHAPE_RESTORE_SHX YES"
+)
 
 
 def refuse_broken_parts(file: Path) -> None:
@@ -30,14 +35,19 @@ def refuse_broken_parts(file: Path) -> None:
             f"{file} is truncated: it has {size} bytes, its header announces {announced}; copy or download it again"
         )
     index = _index(file)
-    if index is None or not len(index):
+    if index is None or not (len(index) or announced > _HEADER):
         return
-    end = int((index.sum(axis=1) + 4).max()) * 2
+    counted = _counted(file)
+    if counted is not None and counted < len(index):
+        raise InputError(
+            f"{file}: its index (.shx) has {len(index)} rows and announces {counted}, so outlines would be missing: "
+            f"{_RESTORE}"
+        )
+    end = int((index.sum(axis=1) + 4).max(initial=_HEADER // 2)) * 2
     if end < announced:
         raise InputError(
             f"{file}: its index (.shx) of {len(index)} rows ends at byte {end} of {announced}, so outlines are "
-            "missing from it: copy the file again with all its parts, or delete the .shx and restore it, for instance "
-            "with ogrinfo --config SHAPE_RESTORE_SHX YES"
+            f"missing from it: {_RESTORE}"
         )
     rows = _table_rows(file)
     if rows is not None and rows != len(index):
@@ -80,6 +90,17 @@ def _index(file: Path) -> NDArray[np.int64] | None:
     if len(content) % 8:
         return None
     return np.frombuffer(content, dtype=">i4").reshape(-1, 2).astype(np.int64)
+
+
+def _counted(file: Path) -> int | None:
+    """Return the number of rows that the header of the index announces; None where it cannot be a number of rows."""
+    part = _part(file, ".shx")
+    if part is None:
+        return None
+    with part.open("rb") as stream:
+        head = stream.read(28)
+    rows, rest = divmod(2 * int.from_bytes(head[24:28], "big") - _HEADER, 8)
+    return rows if rows >= 0 and not rest else None
 
 
 def _table_rows(file: Path) -> int | None:

@@ -22,6 +22,7 @@ from ...core.output import whole_file
 from ...core.plain_paths import plain_path, plain_target
 from ...core.registry import nearest_hint
 from .crs import common_crs, crs_label, file_crs, is_geographic, named_crs, parse_crs, require_metric, same_crs
+from .damaged_outlines import refuse_damaged
 from .degrees import JSON_SYSTEMS, json_means_degrees, refuse_degrees
 from .footprints import Footprints
 from .label_images import ENDINGS, read_labels
@@ -29,7 +30,7 @@ from .layer_styles import add_layer_styles
 from .ogr_layers import layer_names, quiet, read_layer
 from .parquet_files import read_parquet, write_parquet
 from .polygon_repair import Repair
-from .shapefile_parts import damaged_rows, refuse_broken_parts
+from .shapefile_parts import refuse_broken_parts
 from .vector_columns import storable_columns
 from .wkb import geometries_of_wkb
 
@@ -269,14 +270,7 @@ def _read_ogr(
         found = read_layer(path, name)
     if found.wkb is None:
         raise InputError(f"{file}: no polygons: the layer {name!r} has no geometry")
-    if file.suffix.lower() == ".shp":
-        lacking = np.flatnonzero([one is None for one in found.wkb])
-        damaged = damaged_rows(file, lacking, len(found.wkb))
-        if len(damaged):
-            raise InputError(
-                f"{file}: {len(damaged)} outlines are damaged (the first is feature {damaged[0]}): copy or download it "
-                "again"
-            )
+    refuse_damaged(file, name, np.flatnonzero([one is None for one in found.wkb]), len(found.wkb))
     columns = dict(found.columns)
     if file.suffix.lower() == ".shp" and "building_i" in columns:
         columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name

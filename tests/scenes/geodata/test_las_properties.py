@@ -98,6 +98,52 @@ def test_colours_of_8_bit_are_stretched_file_by_file(tmp_path):
         assert np.unique(cloud.colour, axis=0).tolist() == [[200 * 257, 100 * 257, 50 * 257]]
 
 
+@pytest.mark.parametrize("narrow", [1, 40, 200, 397, 400])
+def test_colours_of_8_and_16_bit_are_mixed_inside_a_file(tmp_path, narrow):
+    path = write(tmp_path / "mixed.las", colour=(200, 100, 50))
+    data = laspy.read(path)
+    wide = np.arange(400) >= narrow
+    for name in ("red", "green", "blue"):
+        data[name] = np.where(wide, 257 * np.asarray(data[name]), data[name]).astype(np.uint16)
+    data.write(path)
+    found = np.unique(read_points([path]).colour, axis=0).tolist()
+    # A single dark point of 400 may be black paint.
+    assert found[-1] == [200 * 257, 100 * 257, 50 * 257]
+    assert len(found) == (2 if narrow == 1 else 1)
+
+
+def test_dark_colours_of_16_bit_are_not_stretched(tmp_path):
+    path = write(tmp_path / "dark.las", colour=(1, 1, 1))
+    data = laspy.read(path)
+    for name in ("red", "green", "blue"):
+        data[name] = np.arange(400, dtype=np.uint16) * 4
+    data.write(path)
+    assert read_points([path]).colour.max() == 1596
+
+
+@pytest.mark.parametrize(
+    ("version", "kind"),
+    [*(("1.2", kind) for kind in range(4)), ("1.3", 4), ("1.3", 5), *(("1.4", kind) for kind in range(11))],
+)
+def test_points_of_every_format_are_read(tmp_path, version, kind):
+    header = laspy.LasHeader(version=version, point_format=kind)
+    header.scales, header.offsets = np.full(3, 0.001), np.array([WEST, SOUTH, 0.0])
+    header.add_crs(pyproj.CRS(25832))
+    data = laspy.LasData(header)
+    data.x, data.y, data.z = WEST + np.arange(30), SOUTH + np.arange(30), np.linspace(100, 110, 30)
+    data.classification = np.full(30, 6, dtype=np.uint8)
+    data.write(tmp_path / "a.las")
+    versions = [version] if kind > 1 or version != "1.2" else ["1.2", "1.1", "1.0"]
+    for older in versions:
+        content = bytearray((tmp_path / "a.las").read_bytes())
+        content[25] = int(older[-1])
+        (tmp_path / "a.las").write_bytes(bytes(content))
+        cloud = read_points([tmp_path / "a.las"])
+        assert np.allclose(cloud.x - WEST, np.arange(30))
+        assert np.allclose(cloud.z, np.linspace(100, 110, 30), atol=1e-3)
+        assert (cloud.classification == 6).all()
+
+
 def test_a_tile_without_colour_gives_no_black_image(tmp_path):
     coloured = write(tmp_path / "w.las", colour=(200 * 257, 100 * 257, 50 * 257))
     for bare in (

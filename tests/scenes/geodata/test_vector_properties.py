@@ -1,7 +1,9 @@
 """Properties of vector files of others: cut off, impossible dates, degrees with latitude first, lines of JSON."""
 
 import json
+import sqlite3
 import struct
+from contextlib import closing
 
 import numpy as np
 import pyogrio.raw
@@ -234,3 +236,63 @@ def test_a_geopackage_may_have_any_first_letter(tmp_path, name):
     file = tmp_path / f"{name}.gpkg"
     write_footprints(Footprints.of(SQUARES, crs="EPSG:25832"), file)
     assert len(read_footprints(file)) == 3
+
+
+def geopackage_with(path, row, change):
+    """Write twelve squares as a GeoPackage and change the geometry of one row."""
+    write_footprints(Footprints.of(list(SQUARES) * 4, crs="EPSG:25832"), path)
+    with closing(sqlite3.connect(path)) as database:
+        database.create_function("changed", 1, change)
+        for trigger in database.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
+            database.execute(f'DROP TRIGGER "{trigger[0]}"')
+        database.execute(f'UPDATE "{path.stem}" SET geom = changed(geom) WHERE fid = {row}')
+        database.commit()
+    return path
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *(lambda blob, size=size: blob[:size] for size in (0, 1, 8, 45, -1)),
+        lambda blob: b"XX" + blob[2:],
+        lambda blob: "POLYGON ((0 0, 1 0, 1 1, 0 0))",
+        lambda blob: 7,
+    ],
+)
+def test_an_outline_of_a_geopackage_that_is_damaged_is_not_left_out(tmp_path, change):
+    path = geopackage_with(tmp_path / "cut.gpkg", 4, change)
+    with pytest.raises(InputError, match=r"1 outlines are damaged \(the first is feature 3\)"):
+        read_footprints(path)
+    with pytest.raises(InputError, match=r"(1 outlines are|feature 3 is) damaged"):
+        list(open_stream(path).outlines())
+
+
+def test_a_row_of_a_geopackage_without_outline_is_left_out_and_reported(tmp_path):
+    found = read_footprints(geopackage_with(tmp_path / "none.gpkg", 4, lambda blob: None))
+    assert len(found) == 11
+    assert [(repair.id, repair.problem) for repair in found.repairs] == [(3, "no geometry")]
+
+
+@pytest.mark.parametrize("coordinates", ["text", [[[0, 0], [1]]], [[["0", "0"], ["1", "0"], ["1", "1"], ["0", "0"]]]])
+def test_an_outline_of_json_that_is_damaged_is_not_left_out(tmp_path, coordinates):
+    path = tmp_path / "text.geojson"
+    whole = collection(SQUARES)
+    whole["features"][1]["geometry"]["coordinates"] = coordinates
+    path.write_text(json.dumps(whole))
+    with pytest.raises(InputError, match=r"1 outlines are damaged \(the first is feature 1\)"):
+        read_footprints(path, crs="EPSG:25832")
+
+
+def test_an_index_that_announces_fewer_outlines_than_there_are_loses_none(tmp_path):
+    path = shapefile(tmp_path / "index.shp")
+    index = bytearray(path.with_suffix(".shx").read_bytes())
+    index[24:28] = (54).to_bytes(4, "big")
+    path.with_suffix(".shx").write_bytes(bytes(index))
+    with pytest.raises(InputError, match="announces 1, so outlines would be missing"):
+        read_footprints(path)
+
+
+def test_a_crs_that_ends_early_is_replaced_by_the_one_that_is_given(tmp_path):
+    path = shapefile(tmp_path / "crs.shp")
+    path.with_suffix(".prj").write_text('GEOGCS["x"')
+    assert read_footprints(path, crs="EPSG:25832").crs == "EPSG:25832"
