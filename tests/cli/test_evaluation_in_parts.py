@@ -184,7 +184,7 @@ def test_files_of_two_places_are_named(files):
 def test_a_cluster_gives_the_same_bits(files):
     distributed = pytest.importorskip("distributed")
     here = roofbench("evaluate", "d.gpkg", "r.fgb", "--parts", "5", "-f", "json", "--verdicts", "a.fgb", folder=files)
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster:
         options = ["--scheduler", cluster.scheduler_address, "-f", "json"]
         there = roofbench("evaluate", "d.gpkg", "r.fgb", "--parts", "5", *options, "--verdicts", "b.fgb", folder=files)
         (files / "r.fgb").write_bytes(b"damaged")

@@ -48,7 +48,7 @@ def run(suite, path, execution):
 def test_a_local_cluster_gives_the_same_results(suite, tmp_path):
     here = run(suite, tmp_path / "here.sqlite", Execution(jobs=1))
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0"
     ) as cluster:
         there = run(suite, tmp_path / "there.sqlite", Execution(scheduler=cluster.scheduler_address))
     close_isolated()  # those of the workers, which lived in this process
@@ -59,7 +59,7 @@ def test_a_local_cluster_gives_the_same_results(suite, tmp_path):
 def test_limits_hold_on_a_cluster(suite, tmp_path, misbehaving):
     hanging = replace(suite, detectors=(DetectorEntry(make_detector(misbehaving, {"mode": "hangs"})),))
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
         execution = Execution(scheduler=cluster.scheduler_address, limits=Limits(seconds=2))
         found = run(hanging, tmp_path / "a.sqlite", execution)
