@@ -11,6 +11,9 @@ slab
     are along the longer side of the group's bounds: y, or x with both axes exchanged.
     Edges do not cross inside a slab, so what a group covers of it are trapezoids: the length that is covered in the
     middle of the slab, times its height, is their area.
+strip
+    A part of the plane along the slabs' heights. A group in which many members lie side by side is measured strip by
+    strip, so that few edges pass through a slab.
 
 A point is inside a polygon where an odd number of its edges lie to the left; holes and parts need no rule of their
 own. Coordinates are taken from the lower left corner of the group, so the bits of the area depend neither on the order
@@ -36,6 +39,8 @@ __all__ = ["united_areas"]
 _CHUNK = 512
 #: Most crossings for each edge of a group; with more of them the slabs cost more than an overlay.
 _MOST_CROSSINGS = 24
+#: Members that lie side by side in a strip, and most crossings for each edge there: an overlay of so many is slower.
+_ACROSS, _MOST_IN_STRIP = 12, 384
 #: Edges that begin in a slab, beyond which its edges are sorted anew.
 _MANY_NEW = 16
 
@@ -77,13 +82,6 @@ def _fill(one: Outlines, two: Outlines, members: Members, begin: int, areas: NDA
     """Fill the areas of some groups."""
     for place in range(len(areas)):
         low, high = members.start[begin + place], members.start[begin + place + 1]
-        most = 0
-        for m in range(low, high):
-            most += one.start[members.one[m] + 1] - one.start[members.one[m]]
-            if members.two[m] >= 0:
-                most += two.start[members.two[m] + 1] - two.start[members.two[m]]
-        # An edge: lower end x, y, upper end x, y, and twice the member's number, plus 1 for the second polygon.
-        edges = np.empty((most, 5))
         x, y, right, top = np.inf, np.inf, -np.inf, -np.inf
         for m in range(low, high):
             row = members.one[m]
@@ -96,45 +94,132 @@ def _fill(one: Outlines, two: Outlines, members: Members, begin: int, areas: NDA
         # Slabs across the longer side of the group have few edges each.
         axis = 1 if right - x > top - y else 0
         frame = (x, y, 0) if axis == 0 else (y, x, 1)
-        count = 0
+        side = top - y if axis else right - x
+        across = np.empty((high - low, 2))
+        total = 0.0
         for m in range(low, high):
-            row = members.one[m]
-            count = _gather(one.points, one.start[row], one.start[row + 1], frame, 2.0 * (m - low), edges, count)
-            row = members.two[m]
-            if row >= 0:
-                label = 2.0 * (m - low) + 1.0
-                count = _gather(two.points, two.start[row], two.start[row + 1], frame, label, edges, count)
-        areas[place] = _covered(edges[:count], members.two[low:high])
+            row, other = members.one[m], members.two[m]
+            across[m - low, 0], across[m - low, 1] = one.bounds[row, axis], one.bounds[row, axis + 2]
+            if other >= 0:
+                across[m - low, 0] = max(across[m - low, 0], two.bounds[other, axis])
+                across[m - low, 1] = min(across[m - low, 1], two.bounds[other, axis + 2])
+            across[m - low] -= frame[0]
+            total += max(across[m - low, 1] - across[m - low, 0], 0.0)
+        strips = int(min(side * (high - low) / (total * _ACROSS), high - low)) if total > 0.0 else 1
+        every = np.arange(low, high)
+        if strips < 2:
+            edges = _edges(one, two, members, every, frame, (-np.inf, np.inf))
+            areas[place] = _covered(edges, members.two[low:high], _MOST_CROSSINGS)
+            continue
+        start, inside = _by_strip(across, side / strips, strips)
+        areas[place] = 0.0
+        for strip in range(strips):
+            rows = inside[start[strip] : start[strip + 1]] + low
+            edges = _edges(one, two, members, rows, frame, (side * strip / strips, side * (strip + 1) / strips))
+            areas[place] += _covered(edges, members.two[rows], _MOST_IN_STRIP)
+
+
+@kernel
+def _by_strip(across: NDArray[np.float64], width: float, strips: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return which intervals reach into each strip: those of strip s from ``start[s]`` to ``start[s + 1]``."""
+    start = np.zeros(strips + 2, dtype=np.int64)
+    inside = np.empty(0, dtype=np.int64)
+    for counted in range(2):
+        if counted:
+            start[1:] = np.cumsum(start[1:])
+            inside = np.empty(start[-1], dtype=np.int64)
+        for i in range(len(across)):
+            if across[i, 1] <= across[i, 0]:
+                continue
+            # A little wider, against rounding.
+            first = max(int(across[i, 0] / width - 1e-6), 0)
+            last = min(int(across[i, 1] / width + 1e-6), strips - 1)
+            for strip in range(first, last + 1):
+                if counted:
+                    inside[start[strip + 1]] = i
+                    start[strip + 1] += 1
+                else:
+                    start[strip + 2] += 1
+    return start, inside
+
+
+@kernel
+def _edges(
+    one: Outlines,
+    two: Outlines,
+    members: Members,
+    rows: NDArray[np.int64],
+    frame: tuple[float, float, int],
+    strip: tuple[float, float],
+) -> NDArray[np.float64]:
+    """Return the edges of some members inside a strip.
+
+    An edge: lower end x, y, upper end x, y, and twice the place of the member in `rows`, plus 1 for the second polygon.
+    """
+    most = 0
+    for m in rows:
+        most += one.start[members.one[m] + 1] - one.start[members.one[m]]
+        if members.two[m] >= 0:
+            most += two.start[members.two[m] + 1] - two.start[members.two[m]]
+    edges = np.empty((most if strip[1] == np.inf else 3 * most, 5))
+    count = 0
+    for k in range(len(rows)):
+        row = members.one[rows[k]]
+        count = _gather(one.points[one.start[row] : one.start[row + 1]], frame, strip, 2.0 * k, edges, count)
+        row = members.two[rows[k]]
+        if row >= 0:
+            label = 2.0 * k + 1.0
+            count = _gather(two.points[two.start[row] : two.start[row + 1]], frame, strip, label, edges, count)
+    return edges[:count]
 
 
 @kernel
 def _gather(
     points: NDArray[np.float64],
-    begin: int,
-    end: int,
     frame: tuple[float, float, int],
+    strip: tuple[float, float],
     label: float,
     edges: NDArray[np.float64],
     count: int,
 ) -> int:
-    """Append the edges of an outline, seen from the origin of a frame and its first axis; return how many there are."""
+    """Append the edges of an outline, seen from the origin of a frame and its first axis; return how many there are.
+
+    What lies beside the strip is moved to its border, so that inside it the outline covers what it did.
+    """
     x, y, axis = frame
-    for k in range(begin, end - 1):
+    left, right = strip
+    for k in range(len(points) - 1):
         ax, ay = points[k, axis] - x, points[k, 1 - axis] - y
         bx, by = points[k + 1, axis] - x, points[k + 1, 1 - axis] - y
         if ay == by or ay != ay or by != by:
             continue  # level, or beside the NaN between two rings
         if ay > by:
             ax, ay, bx, by = bx, by, ax, ay
-        edges[count, 0], edges[count, 1], edges[count, 2], edges[count, 3] = ax, ay, bx, by
-        edges[count, 4] = label
-        count += 1
+        # The edge is cut where it crosses a border: first the one that it meets first.
+        near, far = (left, right) if ax <= bx else (right, left)
+        slope = (by - ay) / (bx - ax) if ax != bx else 0.0
+        px, py = min(max(ax, left), right), ay
+        for border in (near, far):
+            if (ax < border < bx) or (bx < border < ax):
+                height = min(max(ay + (border - ax) * slope, py), by)
+                if height > py:
+                    edges[count, 0], edges[count, 1], edges[count, 2], edges[count, 3] = px, py, border, height
+                    edges[count, 4] = label
+                    count += 1
+                px, py = border, height
+        if by > py:
+            edges[count, 0], edges[count, 1], edges[count, 2], edges[count, 3] = px, py, min(max(bx, left), right), by
+            edges[count, 4] = label
+            count += 1
     return count
 
 
 @kernel
-def _covered(edges: NDArray[np.float64], second: NDArray[np.int64]) -> float:
-    """Return the area that the members cover; `second` is -1 where a member is one polygon alone."""
+def _covered(edges: NDArray[np.float64], second: NDArray[np.int64], most: int) -> float:
+    """Return the area that the members cover, NaN beyond `most` crossings for each edge.
+
+    `second` is -1 where a member is one polygon alone.
+    """
     n = len(edges)
     edges = edges[np.argsort(edges[:, 1], kind="mergesort")]
     heights = np.empty(2 * n + 16)
@@ -142,7 +227,7 @@ def _covered(edges: NDArray[np.float64], second: NDArray[np.int64]) -> float:
     for i in range(n):
         heights[count], heights[count + 1] = edges[i, 1], edges[i, 3]
         count += 2
-    limit = count + _MOST_CROSSINGS * n
+    limit = count + most * n
     for i in range(n):
         ax, ay, by, label = edges[i, 0], edges[i, 1], edges[i, 3], edges[i, 4]
         slope = (edges[i, 2] - ax) / (by - ay)

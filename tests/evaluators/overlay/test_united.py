@@ -126,3 +126,23 @@ def test_long_rows_of_houses_are_one_group(along):
     outlines = outlines_of(rb.Footprints.of(row))
     found = united_areas(outlines, outlines, groups)
     assert found[0] == pytest.approx(shapely.union_all(row).area, rel=1e-9)
+
+
+@pytest.mark.parametrize("offset", [0.0, 6e6])
+def test_dense_blocks_are_measured_strip_by_strip(offset):
+    rng = np.random.default_rng(5)
+    court = shapely.box(-6, -5, 6, 5) - shapely.box(-1, -1, 1, 1)
+    sides = [
+        [
+            shapely.affinity.translate(
+                shapely.affinity.rotate(court, angle), offset + 9 * (k % 50), offset + 9 * (k // 50)
+            )
+            for k, angle in enumerate(rng.uniform(0, 180, 2500))
+        ]
+        for _ in range(2)
+    ]
+    alone, pairs = [(k, -1) for k in range(2500)], [(k, k) for k in range(2500)]
+    found = united(*sides, [alone, pairs])
+    expected = [shapely.union_all(sides[0]).area, shapely.union_all(shapely.intersection(*sides)).area]
+    np.testing.assert_allclose(found, expected, rtol=1e-11 if offset == 0 else 1e-8)
+    assert (united(*sides, [alone[::-1], pairs[::-1]]) == found).all()
