@@ -32,6 +32,7 @@ __all__ = ["Check", "check_detector", "check_evaluator", "check_plugin"]
 _SECONDS = 300.0
 #: Names of generated scenes, with which a detector is tried on other measurements.
 _BAITS = ("knox-small-1", "hamlet-2")
+_SEARCH = "does not search its process for the reference"
 _ELSEWHERE = "works in another process, with the same result"
 
 
@@ -64,6 +65,7 @@ def check_detector(detector: Detector) -> list[Check]:
         _check("`stochastic` matches the behaviour", lambda: _stochastic(detector, scene)),
         _check("leaves the scene as it was", lambda: "" if _digest(scene) == before else "it changed the arrays"),
         _check("does not use the name of the scene", lambda: _ignores_names(detector, scene)),
+        _check(_SEARCH, lambda: _ignores_process(elsewhere, detector, scene)),
         _check("a scene without buildings is no error", lambda: _found(detector, _meadow(scene))),
         _check(_ELSEWHERE, lambda: _as_here(elsewhere, detector, scene)),
     ]
@@ -148,6 +150,27 @@ def _ignores_names(detector: Detector, scene: Scene) -> str:
             return (
                 f"under the name {name!r} it finds other footprints in the same measurements: a name leads to the "
                 "reference, so scenes have none in a run"
+            )
+    return ""
+
+
+def _ignores_process(outcome: Outcome, detector: Detector, scene: Scene) -> str:
+    """Try the attack: detect where the callers hold a reference, which is wrong, and where no process holds one."""
+    if outcome.status != "ok":
+        return ""  # reported by the rule of the other process
+    reference = scene.reference
+    assert reference is not None
+    for shift in (3.0, 7.0):
+        bait = Footprints.of(shapely.transform(reference.polygons, lambda xy, by=shift: xy + by), crs=scene.crs)
+        held = Scene(
+            scene.name, scene.extent, crs=scene.crs, points=scene.points, image=scene.image, dem=scene.dem,
+            reference=bait,
+        )  # fmt: skip
+        if shapely.to_wkb(detect(held, detector).polygons).tolist() != list(outcome.detections):
+            return (
+                "it finds other footprints where the frames of its callers hold a reference than in a process that "
+                "never held one. A detector that runs in this process (rb.detect, jobs=0) can reach all its memory; "
+                "trust results of isolated runs only (jobs=1 or more)"
             )
     return ""
 

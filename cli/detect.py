@@ -90,8 +90,8 @@ def detect(
 
     Example: roofbench detect mpp city/ --tile 512 -j 2 -o city.fgb
     """
+    from ..benchmark.execution.run_time import processor_time
     from ..benchmark.execution.worker import detect as run_detector
-    from ..benchmark.execution.worker import processor_time
     from ..benchmark.suite import scenes_of
     from ..core.output import check_target
     from ..detectors.registry import make_detector

@@ -13,7 +13,7 @@ import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,21 @@ from ..scenes.scene import Scene
 from .steps import Step
 from .streams import random_stream
 
-__all__ = ["Detector"]
+__all__ = ["Declaration", "Detector"]
+
+
+class Declaration(NamedTuple):
+    """What a runner must know of a detector; processes in which its code must not run know no more."""
+
+    name: str
+    requires: tuple[str, ...]
+    numbers: tuple[str, ...]
+    place_streams: bool
+
+    @classmethod
+    def of(cls, detector: Detector) -> Declaration:
+        """Return the declaration of a detector."""
+        return cls(detector.name, tuple(detector.requires), tuple(detector.numbers), detector.place_streams)
 
 
 class Detector(Parameterised, ABC):

@@ -40,7 +40,7 @@ from ..core.errors import RoofbenchError
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.ground.lowest_points import default_cell
 from ..scenes.scene import Scene
-from .base import Detector
+from .base import Declaration, Detector
 
 __all__ = ["CUT", "SPARE", "Measured", "Seams", "Tile", "join_tiles", "measure", "owned", "stream_of", "tiles_over"]
 
@@ -154,7 +154,7 @@ def _indices(low: float, high: float, side: float) -> tuple[int, int]:
     return first - (first * side > low), last + (last * side < high)
 
 
-def stream_of(seed: int, tile: Tile, detector: Detector) -> np.random.Generator:
+def stream_of(seed: int, tile: Tile, detector: Detector | Declaration) -> np.random.Generator:
     """Return the random stream of a tile: from seed, column and row, or from the seed alone (`place_streams`)."""
     entropy = [seed] if detector.place_streams else [seed, tile.column % 2**32, tile.row % 2**32]
     return np.random.default_rng(np.random.SeedSequence(entropy))

@@ -19,8 +19,9 @@ from ..store.outcomes import Outcome
 from .city import City, TileWork, plan_tiles, remove_tiles, run_tiles, work_key
 from .executors import Execution, slots_of
 from .isolation import call_isolated
+from .run_time import reason_of
 from .tasks import Task
-from .worker import execute, machine_facts, reason_of
+from .worker import execute, machine_facts
 
 __all__ = ["forget_tiles", "is_city_run", "run_city"]
 

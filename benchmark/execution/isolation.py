@@ -1,17 +1,17 @@
 """Isolation: one process per worker, so that a run that crashes, hangs or exhausts memory fails alone.
 
 An *isolated process* is a new Python interpreter that receives one task after the other as length-prefixed messages
-over its standard streams. Numeric libraries in it use one thread each, because the cores belong to the workers. The
-caller watches time and memory. When a limit is exceeded or the process ends, the task fails with that reason and the
+over its standard streams. It makes or reads the scene and evaluates; the detector runs in a second process, which never
+held anything but measurements (`detection`), so that a detector cannot reach the reference, the seed or the suite.
+Numeric libraries in them use one thread each, because the cores belong to the workers. The caller watches time and
+memory. When a limit is exceeded or the process ends, the task fails with that reason and the
 next task gets a new process. When the caller ends, even by ``kill -9``, the stream closes and the process exits.
 """
 
 from __future__ import annotations
 
+import faulthandler
 import os
-import queue
-import selectors
-import struct
 import subprocess
 import sys
 import tempfile
@@ -28,12 +28,12 @@ from ...core.processes import (
     Limits,
     clean_environment,
     death_reason,
-    end_children,
     end_tree,
     memory_reason,
     time_reason,
 )
 from ..store.outcomes import Cost, Outcome, ScoreFailure
+from .messages import Receiver, listen, receive, send
 from .tasks import Task
 
 __all__ = ["IsolatedProcess", "call_isolated", "close_isolated", "serve"]
@@ -62,22 +62,24 @@ class IsolatedProcess:
         errors.seek(0)
         errors.truncate()
         if limits.memory is not None:
-            bound_allocations(process.pid, limits.memory)
+            for number in [process.pid, *_children(process.pid)]:
+                bound_allocations(number, limits.memory)
         started = time.monotonic()
         peak = 0
         self._detected = None
         try:
-            _send(process.stdin, task.encode())
+            send(process.stdin, task.encode())
             deadline = None if limits.seconds is None else started + limits.seconds
-            receiver = _Receiver(process.stdout)
+            receiver = Receiver(process.stdout)
             while (message := receiver.poll(_pause(limits, deadline))) is None:
                 self._detected = receiver.preliminary
-                peak = highest_memory(process.pid) if limits.memory is None else tree_memory(process.pid)
+                peak = 0 if limits.memory is None else _peak(process.pid)
                 if deadline is not None and time.monotonic() > deadline:
+                    peak = _peak(process.pid)
                     return self._failed(process, task, time_reason(limits.seconds or 0.0), started=started, peak=peak)
                 if limits.memory is not None and peak > limits.memory:
                     return self._failed(process, task, memory_reason(peak, limits.memory), started=started, peak=peak)
-            peak = highest_memory(process.pid)
+            peak = 0 if limits.memory is None else _peak(process.pid)
             if limits.memory is not None and peak > limits.memory:  # a peak between two checks
                 return self._failed(process, task, memory_reason(peak, limits.memory), started=started, peak=peak)
             return message
@@ -140,6 +142,20 @@ class IsolatedProcess:
         return self._process
 
 
+def _children(process: int) -> list[int]:
+    """Return the processes that a process started itself."""
+    import psutil
+
+    with suppress(psutil.Error):
+        return [child.pid for child in psutil.Process(process).children()]
+    return []
+
+
+def _peak(process: int) -> int:
+    """Return the highest memory of an isolated process, or of its detector process with the programs of that, bytes."""
+    return max(highest_memory(process), *map(tree_memory, _children(process)), 0)
+
+
 def _search_path() -> str:
     """Return where modules are found, without the working folder (unless roofbench lies there, or it is asked for)."""
     here = Path.cwd().resolve()
@@ -186,80 +202,24 @@ def close_isolated() -> None:
 
 
 def serve() -> None:
-    """Run tasks from standard input until it closes: the main function of an isolated process."""
+    """Run tasks from standard input until it closes: the main function of an isolated process.
+
+    It opens scenes and evaluates; detectors run in a process that it starts (`detection`).
+    """
     inward, outward = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # output of a detector must not mix with the messages
-    tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-
-    def listen() -> None:
-        while True:
-            try:
-                tasks.put(_receive(inward))
-            except (EOFError, OSError):
-                end_children()
-                os._exit(0)  # the caller has ended, so nobody needs the result
-
-    threading.Thread(target=listen, daemon=True).start()
+    # The caller reads the errors of the detector. Those of this process can name scenes, so they go elsewhere.
+    errors = os.dup(2)
+    faulthandler.enable(errors)
+    with tempfile.TemporaryFile() as own:
+        os.dup2(own.fileno(), 1)
+        os.dup2(own.fileno(), 2)
+    tasks = listen(inward, receive)
+    from .detector_process import DetectorProcess
     from .worker import execute_text
 
+    apart = DetectorProcess(errors, str(Path.cwd()))
     while True:
-        message = execute_text(tasks.get().decode(), lambda detected: _send(outward, detected, preliminary=True))
-        _send(outward, message)
-
-
-#: Bit of a message's size that marks an outcome before its evaluation.
-_PRELIMINARY = 1 << 63
-
-
-def _send(stream: IO[bytes] | None, message: bytes, *, preliminary: bool = False) -> None:
-    assert stream is not None
-    stream.write(struct.pack("<Q", len(message) | (_PRELIMINARY if preliminary else 0)))
-    stream.write(message)
-    stream.flush()
-
-
-def _receive(stream: IO[bytes]) -> bytes:
-    (size,) = struct.unpack("<Q", _exactly(stream, 8))
-    return _exactly(stream, size)
-
-
-def _exactly(stream: IO[bytes], size: int) -> bytes:
-    data = stream.read(size)
-    if len(data) < size:
-        raise EOFError
-    return data
-
-
-class _Receiver:
-    """A message that arrives in pieces, and the preliminary one before it."""
-
-    def __init__(self, stream: IO[bytes] | None) -> None:
-        assert stream is not None
-        self._descriptor = stream.fileno()
-        self._data = bytearray()
-        self._size: int | None = None
-        self.preliminary: bytes | None = None
-
-    def poll(self, seconds: float) -> bytes | None:
-        """Wait for at most this time; return the message when it is complete."""
-        with selectors.DefaultSelector() as selector:
-            selector.register(self._descriptor, selectors.EVENT_READ)
-            if not selector.select(seconds):
-                return None
-        piece = os.read(self._descriptor, 1 << 20)
-        if not piece:
-            raise EOFError
-        self._data += piece
-        while True:
-            if self._size is None and len(self._data) >= 8:
-                (self._size,) = struct.unpack("<Q", self._data[:8])
-                del self._data[:8]
-            if self._size is None or len(self._data) < self._size & ~_PRELIMINARY:
-                return None
-            size = self._size & ~_PRELIMINARY
-            message = bytes(self._data[:size])
-            if self._size == size:
-                return message
-            self.preliminary = message
-            del self._data[:size]
-            self._size = None
+        message = execute_text(
+            tasks.get().decode(), detected=lambda detected: send(outward, detected, preliminary=True), apart=apart
+        )
+        send(outward, message)

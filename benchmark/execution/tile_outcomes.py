@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ...detectors.base import Detector
+from ...detectors.base import Declaration, Detector
 from ...detectors.tiling import Seams, Tile, join_tiles
 from ...scenes.geodata.footprints import Footprints
 from ..store.outcomes import Cost, Outcome
@@ -46,7 +46,7 @@ def tile_of_file(file: Path, side: float) -> Tile:
     return Tile(row, column, side)
 
 
-def join_outcomes(files: Mapping[Tile, Path], detector: Detector, crs: str | None) -> JoinedTiles:
+def join_outcomes(files: Mapping[Tile, Path], detector: Detector | Declaration, crs: str | None) -> JoinedTiles:
     """Join the stored outcomes of the tiles that are finished."""
     parts: dict[Tile, Footprints] = {}
     skipped: dict[Tile, str] = {}

@@ -6,7 +6,6 @@ import dataclasses
 import os
 import platform
 import tempfile
-import time
 import traceback
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
@@ -19,10 +18,10 @@ import numpy as np
 import shapely
 from shapely import Geometry
 
-from ...core.errors import InputError, MissingInputError, RoofbenchError
-from ...core.memory import highest_memory, reset_highest_memory
+from ...core.errors import InputError, MissingInputError
+from ...core.memory import reset_highest_memory
 from ...core.plain_values import plain_value
-from ...detectors.base import Detector
+from ...detectors.base import Declaration, Detector
 from ...detectors.checks import checked_output
 from ...detectors.external.precomputed import Precomputed
 from ...detectors.streams import random_stream
@@ -34,12 +33,15 @@ from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
 from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure
+from .detection import detect_on
+from .detector_process import DetectionFailedError, DetectorProcess
 from .read_ahead import ReadAhead
+from .run_time import Stopwatch, reason_of
 from .scene_picture import scene_picture
 from .tasks import Task, TilePart
 from .tile_outcomes import join_outcomes, tile_of_file
 
-__all__ = ["detect", "execute", "execute_text", "machine_facts", "processor_time", "reason_of", "score"]
+__all__ = ["describe", "detect", "execute", "execute_text", "machine_facts", "score"]
 
 #: The scenes opened last; consecutive tasks of a plan often use the same scene.
 _scenes: OrderedDict[str, Scene] = OrderedDict()
@@ -53,29 +55,63 @@ _MANY, _PART = 200_000, 100_000
 def detect(scene: Scene, detector: Detector, *, seed: int = 0, stream: np.random.Generator | None = None) -> Footprints:
     """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector.
 
-    A part of a scene has a `stream` of its own.
+    A part of a scene has a `stream` of its own. The detector runs in this process.
     """
     scene.require(detector.requires)
     visible = scene.for_detection()
     if type(detector) is Precomputed:  # no subclass: a plugin must not learn the name
         found = detector.footprints_of(scene.name, visible)
+        facts: Mapping[str, Any] = found.metadata
     else:
         rng = random_stream(seed, scene.name, detector.name) if stream is None else stream
-        found = detector.detect(visible, rng)
+        found, facts = detect_on(detector, visible, rng)
     found = checked_output(found, scene, detector.name)
     # What was estimated for lack of a DEM goes where the footprints go: to the screen, the store, the caller.
-    notes = [*found.metadata.get("notes", ()), *visible.notes]
-    return dataclasses.replace(found, metadata={**found.metadata, **({"notes": notes} if notes else {})})
+    return dataclasses.replace(found, metadata=facts)
 
 
-def execute_text(task: str, detected: Callable[[bytes], None] | None = None) -> bytes:
+class _Here:
+    """A detector that runs in this process."""
+
+    def __init__(self, detector: Detector) -> None:
+        self.detector, self.declaration = detector, Declaration.of(detector)
+
+    def detect(self, scene: Scene, stream: np.random.Generator) -> tuple[Footprints, Cost]:
+        watch = Stopwatch.start()
+        found = detect(scene, self.detector, stream=stream)
+        return found, Cost(**watch.read())
+
+
+class _Apart:
+    """A detector that runs in a detector process, where alone its code is imported."""
+
+    def __init__(self, process: DetectorProcess, recipe: PluginRecipe) -> None:
+        self._process, self._recipe, self.declaration = process, recipe, process.declaration(recipe)
+
+    def detect(self, scene: Scene, stream: np.random.Generator) -> tuple[Footprints, Cost]:
+        found, cost = self._process.detect(self._recipe, scene, stream)
+        return checked_output(found, scene, self.declaration.name), cost
+
+
+def _runs_here(task: Task) -> bool:
+    """Return whether a task is run in the process that opens scenes.
+
+    Footprints made elsewhere are found by the name of the scene. A city that is one task is timed by the gate
+    and not evaluated.
+    """
+    return task.detector.use == Precomputed.name or (task.scene.tile > 0 and task.part is None and not task.tiles)
+
+
+def execute_text(
+    task: str, *, detected: Callable[[bytes], None] | None = None, apart: DetectorProcess | None = None
+) -> bytes:
     """Run a task given as text, the form in which tasks are sent between processes; see `execute`."""
 
     def forward(outcome: Outcome) -> None:
         if detected is not None:
             detected(outcome.to_bytes())
 
-    return execute(Task.from_json(task), detected=forward).to_bytes()
+    return execute(Task.from_json(task), detected=forward, apart=apart).to_bytes()
 
 
 def execute(
@@ -85,6 +121,7 @@ def execute(
     detector: Detector | None = None,
     evaluators: Sequence[Evaluator] | None = None,
     detected: Callable[[Outcome], None] | None = None,
+    apart: DetectorProcess | None = None,
 ) -> Outcome:
     """Run a task; a failure or a skip is an outcome, too.
 
@@ -95,13 +132,20 @@ def execute(
         The objects themselves, where task and caller share a process.
     detected : callable, optional
         Called with the outcome as it is before the evaluation, so that a crash of an evaluator loses no detection.
+    apart : DetectorProcess, optional
+        Where the detector runs, which must not share a process with the reference; by default in this process. A city
+        that is one task, timed by the gate and not evaluated, is always detected in this process.
     """
-    started = _now()
+    watch = Stopwatch.start()
     reset_highest_memory()  # a limit applies to this run, not to earlier ones
     record = None
     try:
         scene = scene if scene is not None else _opened(task.scene)
-        detector = detector if detector is not None else task.detector.detector()
+        runs: _Here | _Apart
+        if detector is not None or apart is None or _runs_here(task):
+            runs = _Here(detector if detector is not None else task.detector.detector())
+        else:
+            runs = _Apart(apart, task.detector)
         if evaluators is None:
             evaluators = [recipe.evaluator() for recipe in task.evaluators]
         if task.part is None:
@@ -112,31 +156,34 @@ def execute(
         if task.part is not None:
             scene = _ahead.take(_window_key(task.scene, task.part)) or _window(scene, task.part)
         if not is_city:
-            scene.require(detector.requires)
+            scene.require(runs.declaration.requires)
             scene.for_detection()  # reads all inputs: the time of a detector is that of detection in memory
             if task.part is None:
                 reset_highest_memory()  # that of a tile includes its reading
         if task.part is not None and task.ahead is not None:
             _read_ahead(whole, task.scene, dataclasses.replace(task.part, tile=task.ahead))
-        started, of_tiles = _now(), None
+        watch = Stopwatch.start()
         if is_city and task.tiles:
-            found, of_tiles = _joined_city(scene, detector, task)
+            found, cost = _joined_city(scene, runs.declaration, task)
         elif is_city:
-            found = _detect_city(scene, detector, task.seed, task.scene.tile)
+            assert isinstance(runs, _Here)
+            found, cost = _detect_city(scene, runs.detector, task.seed, task.scene.tile), Cost(**watch.read())
         elif task.part is None:
-            found = detect(scene, detector, seed=task.seed)
+            found, cost = runs.detect(scene, random_stream(task.seed, scene.name, runs.declaration.name))
         else:
-            found = _detect_part(scene, detector, task.seed, task.part, whole.extent)
-        cost = of_tiles or _cost_since(started)
+            found, cost = _detect_part(scene, runs, task.seed, task.part, whole.extent)
         codes = task.codes or [code_digest(evaluator) for evaluator in evaluators]
     except MissingInputError as error:  # the scene lacks an input, or this machine a program
         return Outcome(status="skipped", reason=reason_of(error), scene=record, machine=machine_facts())
+    except DetectionFailedError as error:
+        machine = {} if error.process_ended else machine_facts()
+        return Outcome(status="failed", reason=str(error), traceback=error.trace, cost=error.cost, machine=machine)
     except Exception as error:
         return Outcome(
             status="failed",
             reason=reason_of(error),
             traceback=traceback.format_exc(),
-            cost=_cost_since(started),
+            cost=Cost(**watch.read()),
             machine=machine_facts(),
         )
     outcome = Outcome(
@@ -187,7 +234,7 @@ def _read_ahead(scene: Scene, recipe: SceneRecipe, part: TilePart) -> None:
     _ahead.start(_window_key(recipe, part), read)
 
 
-def _joined_city(scene: Scene, detector: Detector, task: Task) -> tuple[Footprints, Cost]:
+def _joined_city(scene: Scene, detector: Declaration, task: Task) -> tuple[Footprints, Cost]:
     """Return the city of stored tiles, and what they cost."""
     files = {tile_of_file(Path(file), task.scene.tile): Path(file) for file in task.tiles}
     joined = join_outcomes(files, detector, scene.crs)
@@ -215,7 +262,7 @@ def _detect_city(scene: Scene, detector: Detector, seed: int, side: float) -> Fo
         window = _window(scene, part)
         reason = window.lacks(fixed.requires)
         if reason is None:
-            parts[tile] = _detect_part(window, fixed, seed, part, scene.extent)
+            parts[tile] = _detect_part(window, _Here(fixed), seed, part, scene.extent)[0]
         lacking = lacking or reason or ""
     if not parts:
         raise MissingInputError(lacking)
@@ -223,14 +270,14 @@ def _detect_city(scene: Scene, detector: Detector, seed: int, side: float) -> Fo
 
 
 def _detect_part(
-    scene: Scene, detector: Detector, seed: int, part: TilePart, whole: tuple[float, float, float, float]
-) -> Footprints:
-    """Return what a tile owns; the scene is its window, which may have no points."""
+    scene: Scene, runs: _Here | _Apart, seed: int, part: TilePart, whole: tuple[float, float, float, float]
+) -> tuple[Footprints, Cost]:
+    """Return what a tile owns and its cost; the scene is its window, which may have no points."""
     if scene.points is not None and len(scene.points) == 0:
-        found = Footprints.empty(crs=scene.crs)
+        found, cost = Footprints.empty(crs=scene.crs), Cost()
     else:
-        found = detect(scene, detector, stream=stream_of(seed, part.tile, detector))
-    return owned(found, part.tile, scene.extent, whole)
+        found, cost = runs.detect(scene, stream_of(seed, part.tile, runs.declaration))
+    return owned(found, part.tile, scene.extent, whole), cost
 
 
 def score(
@@ -273,14 +320,6 @@ def _score_in_parts(
     return dataclasses.replace(score, verdicts=tuple(table.to_bytes() for table in verdicts))
 
 
-def reason_of(error: Exception) -> str:
-    """Return an error of a detector or an evaluator as one line."""
-    reason = str(error) if isinstance(error, RoofbenchError) else f"{type(error).__name__}: {error}"
-    if isinstance(error, MemoryError):
-        reason = f"out of memory: {error}".rstrip(": ")
-    return " ".join(reason.split())[:500]
-
-
 def describe(scene: Scene, *, is_city: bool = False) -> SceneRecord:
     """Return the record of a scene; of a city neither points nor images are read for it."""
     reference = scene.reference
@@ -317,24 +356,6 @@ def _opened(recipe: SceneRecipe) -> Scene:
         _scenes[key] = recipe.open()
     _scenes.move_to_end(key)
     return _scenes[key]
-
-
-def processor_time() -> float:
-    """Return the processor time of this process and of the programs that it ran, seconds."""
-    times = os.times()
-    return time.process_time() + times.children_user + times.children_system
-
-
-def _now() -> tuple[float, float]:
-    return time.perf_counter(), processor_time()
-
-
-def _cost_since(started: tuple[float, float]) -> Cost:
-    return Cost(
-        seconds=time.perf_counter() - started[0],
-        cpu_seconds=_now()[1] - started[1],
-        peak_memory=highest_memory(),
-    )
 
 
 @cache

@@ -123,3 +123,41 @@ def test_an_isolated_detector_sees_neither_store_nor_suite(tmp_path, monkeypatch
     for text in (str(metadata["environment"]), str(metadata["arguments"]), metadata["folder"], str(metadata["scene"])):
         assert "secret" not in text
         assert "hamlet" not in text
+
+
+SPY = f"{PLUGINS / 'spying.py'}:Spying"
+
+
+def spied(folder, search, *options):
+    """Return what the spying detector learnt on the built-in scene, in a run by a suite and store with known names."""
+    (folder / "wombat-suite.toml").write_text(
+        f'[[scenes]]\npreset = "hamlet"\nseeds = [5]\n\n[[detectors]]\nuse = "{SPY}"\nsearch = "{search}"\n'
+    )
+    roofbench("run", "wombat-suite.toml", "--store", "wombat-store.sqlite", *options, folder=folder)
+    with Store(folder / "wombat-store.sqlite") as store:
+        (row,) = store.runs()
+        return row, store.metadata(row.id)
+
+
+def test_a_detector_that_searches_its_process_finds_nothing(tmp_path):
+    """Frames, threads, modules, all objects; environment, command line, folder and files, those of the parent, too."""
+    place = tmp_path / "wombat-place"
+    place.mkdir()
+    row, learnt = spied(place, "all")
+    assert (row.status, row.detected) == ("ok", 0)
+    assert learnt == {"references": 0, "recipes": [], "secrets": []}
+
+
+@pytest.mark.parametrize("search", ["frames", "objects"])
+def test_the_search_would_find_the_reference_in_a_process_that_holds_it(search):
+    scene = hamlet(5)
+    assert len(scene.reference)
+    found = rb.detect(scene, make_detector(SPY, {"search": search}))
+    assert len(found)
+    assert found.metadata["references"]
+
+
+def test_a_spying_plugin_is_reported_by_its_check():
+    broken = {check.rule: check.problem for check in check_detector(make_detector(SPY)) if not check.passed}
+    assert "does not search its process for the reference" in broken
+    assert "runs in this process" in broken["does not search its process for the reference"]

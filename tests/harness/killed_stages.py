@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from roofbench.benchmark.execution.worker import processor_time
+from roofbench.benchmark.execution.run_time import processor_time
 from roofbench.benchmark.store.writer import Store
 
 __all__ = ["STAGES", "Result", "kill_stage"]
