@@ -21,6 +21,11 @@ def pytest_collection_modifyitems(items):
 MISBEHAVING = f"{Path(__file__).parent / 'plugins' / 'misbehaving.py'}:Misbehaving"
 
 
+def pytest_make_parametrize_id(val, argname):
+    """Name long values by their length: older versions of pytest write all of them, a hundred million bytes of one."""
+    return f"{argname}-of-{len(val)}" if isinstance(val, str | bytes) and len(val) > 300 else None
+
+
 @pytest.fixture(autouse=True)
 def plugins_of_this_test_only(monkeypatch):
     """Forget the plugins that a test adds: ``-e all`` would use them in the next one."""
