@@ -42,7 +42,19 @@ from ..scenes.ground.lowest_points import default_cell
 from ..scenes.scene import Scene
 from .base import Declaration, Detector
 
-__all__ = ["CUT", "SPARE", "Measured", "Seams", "Tile", "join_tiles", "measure", "owned", "stream_of", "tiles_over"]
+__all__ = [
+    "CUT",
+    "SPARE",
+    "Measured",
+    "Seams",
+    "Tile",
+    "join_tiles",
+    "measure",
+    "owned",
+    "stream_of",
+    "tiles_of",
+    "tiles_over",
+]
 
 #: Attributes of the footprints of a tile that say which are cut and which are spare; `join_tiles` removes them.
 CUT, SPARE = "cut_by_tile", "spare_of_tile"
@@ -146,6 +158,11 @@ def tiles_over(extent: _Extent, side: float) -> list[Tile]:
     """
     (west, east), (south, north) = (_indices(extent[axis], extent[axis + 2], side) for axis in (0, 1))
     return [Tile(row, column, side) for row in range(south, north) for column in range(west, east)]
+
+
+def tiles_of(scene: Scene, side: float, halo: float) -> list[Tile]:
+    """Return the tiles of a scene that see something of it: between two towns there may be none for many kilometres."""
+    return [tile for tile in tiles_over(scene.extent, side) if not scene.is_empty(tile.core, halo)]
 
 
 def _indices(low: float, high: float, side: float) -> tuple[int, int]:

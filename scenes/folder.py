@@ -291,6 +291,9 @@ class _LayerFile:
     def digest(self, extent: tuple[float, float, float, float]) -> str:
         return f"{self.kind} {self.entry['sha256']}"
 
+    def meets(self, extent: tuple[float, float, float, float]) -> bool:
+        return True
+
     def _read(self, extent: tuple[float, float, float, float] | None) -> Any:
         if self.kind == "points":
             from .geodata.las_files import read_points

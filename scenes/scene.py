@@ -66,6 +66,9 @@ class LayerFiles(Protocol):
     def digest(self, extent: tuple[float, float, float, float]) -> str:
         """Return a text that changes when the files that hold this part change; they are not read."""
 
+    def meets(self, extent: tuple[float, float, float, float]) -> bool:
+        """Return whether a file may hold something inside an extent."""
+
 
 class Scene(Displayed):
     """A place with its measurements and its ground truth.
@@ -255,6 +258,13 @@ class Scene(Displayed):
         part.ground_cell, part.whole = self.ground_cell, self.whole
         part.core = max(xmin, own[0]), max(ymin, own[1]), min(xmax, own[2]), min(ymax, own[3])
         return part
+
+    def is_empty(self, extent: tuple[float, float, float, float], halo: float = 0.0) -> bool:
+        """Return whether all measurements lie in files of which none meets a window."""
+        xmin, ymin, xmax, ymax = extent
+        wanted = (xmin - halo, ymin - halo, xmax + halo, ymax + halo)
+        sources = [self._sources[name] for name in ("points", "image", "dem") if self._sources[name] is not None]
+        return all(isinstance(source, LayerFiles) and not source.meets(wanted) for source in sources)
 
     def _part(self, name: str, extent: tuple[float, float, float, float]) -> Any:
         """Return a layer inside an extent; a layer in files is not kept."""

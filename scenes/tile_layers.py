@@ -105,6 +105,10 @@ class TiledLayer:
         """Return the checksums of the files that an extent meets."""
         return f"{self.layer} {' '.join(file.sha256 for file in self._met(extent))}"
 
+    def meets(self, extent: _Extent) -> bool:
+        """Return whether a file may hold something inside an extent."""
+        return any(file.meets(extent) for file in self.files)
+
     def _met(self, extent: _Extent) -> list[TileFile]:
         return [file for file in self.files if file.meets(extent)]
 

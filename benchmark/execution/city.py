@@ -22,7 +22,7 @@ from ...core.digests import digest
 from ...core.errors import OutputError, ParameterError
 from ...core.output import check_target, whole_file
 from ...detectors.base import Detector
-from ...detectors.tiling import Measured, Seams, Tile, measure, tiles_over
+from ...detectors.tiling import Measured, Seams, Tile, measure, tiles_of
 from ...scenes.geodata.vector_files import output_driver, write_footprints
 from ...scenes.scene import Scene
 from ..identity.keys import module_closure
@@ -183,7 +183,7 @@ def plan_tiles(
     """Return the tasks of all tiles, and measure what they share; the folder is made."""
     scene = recipe.open()
     halo = detector.halo if city.halo is None else city.halo
-    tiles = tiles_over(scene.extent, city.tile)
+    tiles = tiles_of(scene, city.tile, halo)
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:

@@ -25,7 +25,7 @@ from ...detectors.base import Declaration, Detector
 from ...detectors.checks import checked_output
 from ...detectors.external.precomputed import Precomputed
 from ...detectors.streams import random_stream
-from ...detectors.tiling import Tile, join_tiles, measure, owned, stream_of, tiles_over
+from ...detectors.tiling import Tile, join_tiles, measure, owned, stream_of, tiles_of
 from ...evaluators.base import Evaluator
 from ...evaluators.in_parts import ThresholdFree, evaluate_sets
 from ...scenes.geodata.footprints import Footprints
@@ -252,7 +252,7 @@ def _window(scene: Scene, part: TilePart) -> Scene:
 
 def _detect_city(scene: Scene, detector: Detector, seed: int, side: float) -> Footprints:
     """Return what a detector finds on a scene tile by tile, one tile in memory at a time."""
-    tiles = tiles_over(scene.extent, side)
+    tiles = tiles_of(scene, side, detector.halo)
     measured = measure(scene, detector, tiles)
     fixed = detector.replaced(measured.parameters)
     parts: dict[Tile, Footprints] = {}

@@ -1,5 +1,6 @@
 """A city: tiles give what the whole gives, in any order, with any number of workers, and after any interruption."""
 
+import dataclasses
 import os
 import random
 import shutil
@@ -243,6 +244,21 @@ def test_a_bad_file_costs_its_tiles_alone_and_a_repaired_one_is_computed_then(co
     assert code == 0, message
     assert "finished before" in message
     assert output.read_bytes() == columns[1]
+
+
+def test_tiles_without_any_file_are_not_computed(columns, tmp_path):
+    """The easternmost file, 300 km away."""
+    folder, output = tmp_path / "tiles", tmp_path / "city.fgb"
+    shutil.copytree(columns[0], folder)
+    east = (WEST + 128, SOUTH, WEST + SIDE, SOUTH + SIDE)
+    points = town().window(east).points
+    write_points(dataclasses.replace(points, x=points.x + 300_032), folder / "2.laz", crs="EPSG:25832")
+    index_folder(folder)
+    result = detect(folder, output)
+    assert result.tiles < 40
+    assert not result.failed
+    moved = rb.detect(rb.Scene("east", east, crs="EPSG:25832", points=points, dem=town().dem), NDSM)
+    assert (rb.read_footprints(output).centres[:, 0] > 300_000).sum() == len(moved) > 0
 
 
 def test_files_that_overlap_give_what_files_side_by_side_give(columns, tmp_path):
