@@ -59,11 +59,14 @@ def check_scene(path: str | os.PathLike[str]) -> SceneReport:
         for name in changed_files(path)
     ]
     facts: dict[str, dict[str, Any]] = {"scene": _scene_facts(scene)}
+    indexed = {tile["layer"] for tile in manifest.get("tiles", ())}
     for kind in scene.contents:
         try:
             facts[kind], found = _part(kind, scene)
             problems.extend(found)
-            problems.extend(_crs_problems(folder / FILES[kind], kind, scene.crs))
+            # The CRS of tiles was checked, or given, when they were indexed.
+            if kind not in indexed:
+                problems.extend(_crs_problems(folder / FILES[kind], kind, scene.crs))
         except RoofbenchError as error:
             problems.append(str(error))
     if not {"points", "image"} & set(scene.contents):

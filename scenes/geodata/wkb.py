@@ -33,6 +33,11 @@ def geometries_of_wkb(wkb: NDArray[np.object_], file: Path) -> tuple[NDArray[np.
         geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
         unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
         for row in unread:
+            if isinstance(wkb[row], str):
+                raise InputError(
+                    f"{file}: its geometry is text where WKB is announced ({wkb[row][:40]!r}): write the file anew, "
+                    "for instance with ogr2ogr"
+                )
             polygons = _with_polygons(bytes(wkb[row]))
             geometries[row] = shapely.from_wkb(polygons, on_invalid="ignore")
             if geometries[row] is not None:
@@ -52,7 +57,7 @@ def _with_polygons(wkb: bytes) -> bytes:
     changed = bytearray(wkb)
     try:
         _rewrite(changed, 0, 0)
-    except (struct.error, ValueError):
+    except (struct.error, ValueError, IndexError):
         return wkb
     return bytes(changed)
 

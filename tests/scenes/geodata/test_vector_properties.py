@@ -219,6 +219,40 @@ def test_geoparquet_that_describes_something_else_is_refused(tmp_path, changes):
         read_footprints(described(tmp_path / "a.parquet", **changes))
 
 
+@pytest.mark.parametrize(
+    "change",
+    [*(lambda blob, size=size: blob[:size] for size in (0, 1, 5, 40, -1)), lambda blob: b"garbage"],
+)
+def test_an_outline_of_geoparquet_that_is_damaged_is_not_left_out(tmp_path, change):
+    import pyarrow
+    import pyarrow.parquet
+
+    file = described(tmp_path / "a.parquet")
+    table = pyarrow.parquet.read_table(file)
+    blobs = [one.as_py() for one in table["geometry"]]
+    blobs[1] = change(blobs[1])
+    place = table.column_names.index("geometry")
+    changed = table.set_column(place, "geometry", pyarrow.array(blobs))
+    pyarrow.parquet.write_table(changed, file)
+    for read in (read_footprints, lambda path: list(open_stream(path).outlines())):
+        with pytest.raises(InputError, match="the geometry of feature 1 is damaged"):
+            read(file)
+
+
+def test_geoparquet_with_text_for_wkb_is_refused(tmp_path):
+    import pyarrow
+    import pyarrow.parquet
+
+    file = described(tmp_path / "a.parquet")
+    table = pyarrow.parquet.read_table(file)
+    texts = pyarrow.array([one.wkt for one in SQUARES])
+    changed = table.set_column(table.column_names.index("geometry"), "geometry", texts)
+    pyarrow.parquet.write_table(changed, file)
+    for read in (read_footprints, lambda path: list(open_stream(path).outlines())):
+        with pytest.raises(InputError):
+            read(file)
+
+
 def test_a_column_of_geoparquet_that_cannot_be_converted_is_left_out(tmp_path):
     import pyarrow.parquet
 

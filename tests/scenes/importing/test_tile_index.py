@@ -7,6 +7,7 @@ import pytest
 from builders.small_scenes import CRS, SOUTH, WEST, cloud, image, scene
 
 from roofbench.core.errors import CRSError, InputError
+from roofbench.scenes.checking import check_scene
 from roofbench.scenes.folder import changed_files, open_scene, save_scene
 from roofbench.scenes.geodata.las_files import read_points, write_points
 from roofbench.scenes.geodata.point_chunks import read_chunk_index, write_chunk_index
@@ -41,6 +42,7 @@ def test_an_indexed_folder_is_the_scene_of_its_tiles(tiles):
     assert found.problems == ()
     assert found.scene.contents == ("points", "image", "dem")
     assert found.scene.extent == WHOLE
+    assert check_scene(tiles).problems == ()
     assert np.array_equal(ordered(found.scene.points), ordered(whole.points))
     assert np.array_equal(found.scene.image.values, whole.image.values)
     assert found.scene.image.grid == whole.image.grid
