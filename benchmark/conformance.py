@@ -66,7 +66,7 @@ def check_detector(detector: Detector) -> list[Check]:
         _check("leaves the scene as it was", lambda: "" if _digest(scene) == before else "it changed the arrays"),
         _check("does not use the name of the scene", lambda: _ignores_names(detector, scene)),
         _check(_SEARCH, lambda: _ignores_process(elsewhere, detector, scene)),
-        _check("a scene without buildings is no error", lambda: _found(detector, _meadow(scene))),
+        _check("a scene without buildings raises no error", lambda: _found(detector, _meadow(scene))),
         _check(_ELSEWHERE, lambda: _as_here(elsewhere, detector, scene)),
     ]
 
@@ -85,7 +85,7 @@ def check_evaluator(evaluator: Evaluator) -> list[Check]:
         *_declaration(evaluator),
         _check("reports every index that it declares, and no other", lambda: _indices(evaluated(moved, reference))),
         _check("values lie in the declared range", lambda: _range(evaluated(moved, reference))),
-        _check("a perfect result and empty sets are no errors", lambda: _edges(evaluated, reference, empty)),
+        _check("a perfect result and empty sets raise no error", lambda: _edges(evaluated, reference, empty)),
         _check("indices follow from tallies", lambda: _summary(evaluated(moved, reference))),
         _check("order of the objects does not matter", lambda: _order(evaluated, moved, reference)),
         _check("pooling one evaluation changes nothing", lambda: _pooling(evaluated(moved, reference))),

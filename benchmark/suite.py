@@ -161,16 +161,16 @@ def scenes_of(words: Iterable[str]) -> tuple[SceneRecipe, ...]:
                 known += (file.parent.name for file in Path().glob("*/scene.toml"))
                 if path.suffix.lower() in _MEASUREMENTS:
                     raise UnknownNameError(
-                        f"{word!r} is a file of measurements and no scene: make a scene folder of it with "
+                        f"{word!r} is a measurement file, not a scene: make a scene folder of it with "
                         "'roofbench scenes import'"
                     )
                 if word in suite_names() or path.suffix == ".toml":
                     raise UnknownNameError(
-                        f"{word!r} is a suite and no scene: 'roofbench run {word}' runs it by itself, "
+                        f"{word!r} is a suite, not a scene: 'roofbench run {word}' runs it by itself, "
                         "'roofbench list scenes' shows single scenes"
                     )
                 raise UnknownNameError(
-                    f"{word!r} is no scene, preset or suite{nearest_hint(name, known)}: 'roofbench list scenes' "
+                    f"{word!r} is not a scene, preset or suite{nearest_hint(name, known)}: 'roofbench list scenes' "
                     "and 'roofbench list suites' show what there is"
                 )
             parameters = {key: _number(value) for key, value in values.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +11,7 @@ import typer
 from ..core.errors import InputError
 from . import completion
 from .command import Command, RunOptions, with_run_options
-from .console import messages
+from .console import messages, print_next
 from .measuring import measure_suite
 from .options import DetectorOption, EvaluatorsOption, OverwriteOption, ScenesOption, SeedsOption
 
@@ -58,7 +59,7 @@ def save(
     from ..benchmark.identity.provenance import code_version
     from ..benchmark.suite import suite_of_words
     from ..core.output import check_target
-    from ..reports.format import counted
+    from ..core.wording import counted
 
     check_target(output, overwrite)
     version = code_version()
@@ -77,5 +78,6 @@ def save(
     measured.save(output, overwrite=overwrite)
     detectors, places = counted(len(measured.detectors), "detector"), counted(len(measured.scenes), "scene")
     console.print(f"{output}: {detectors} on {places}, {version}", markup=False)
+    print_next(console, f"roofbench gate {shlex.quote(str(output))}")
     if failed:
         raise typer.Exit(3)

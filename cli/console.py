@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["messages", "printable", "say", "table_console"]
+__all__ = ["messages", "print_next", "printable", "say", "table_console"]
 
 
 def printable(text: str) -> str:
@@ -24,6 +24,11 @@ def printable(text: str) -> str:
 def say(text: str) -> None:
     """Print a message to standard error."""
     typer.echo(printable(text), err=True)
+
+
+def print_next(console: Console, command: str) -> None:
+    """Print the command that usually follows."""
+    console.print(f"next: {command}", markup=False, soft_wrap=True)
 
 
 def messages(quiet: bool = False) -> Console:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import ParameterError, ProgramError, RoofbenchError
+from ..core.wording import counted
 from . import completion
 from .command import load_plugins
 from .console import say
@@ -141,7 +142,7 @@ def detect(
                 say(f"note: {place.name}: {note}")
             if found.metadata.get("cues"):
                 say(f"cues used on {place.name}: {', '.join(found.metadata['cues'])}")
-            say(f"{output}: {len(found)} footprints on {place.name} in {seconds:.2f} CPU seconds")
+            say(f"{output}: {counted(len(found), 'footprint')} on {place.name} in {seconds:.2f} CPU seconds")
     if steps is not None:
         count = _write_steps(chosen, place, seed, steps, overwrite)
         if not quiet:

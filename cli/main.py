@@ -80,7 +80,7 @@ def main() -> None:
         _close_stdout()
         sys.exit(2)
     except MemoryError as error:
-        _print_error(f"the memory does not suffice: {error or 'a file is too large for this machine'}")
+        _print_error(f"out of memory: {error or 'a file is too large for this machine'}")
         sys.exit(2)
     except Exception as error:
         import sqlite3  # here, since evaluate has no store

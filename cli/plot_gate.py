@@ -24,3 +24,4 @@ def plot_gate(
     from ..reports.gate_json import read_gate
 
     save_plot(gate_figure(read_gate(result)), output, dpi=dpi, overwrite=overwrite)
+    typer.echo(output)

@@ -91,6 +91,7 @@ def plot_scene(
     if view is None:
         raise ParameterError(f"{store}: {name!r} has no verdicts to draw: it has no reference, or was not evaluated")
     save_plot(overlay_figure(view, window=_placed(window, view.extent)), output, dpi=dpi, overwrite=overwrite)
+    typer.echo(output)
 
 
 def _placed(window: Window | None, extent: Extent) -> Extent | None:

@@ -70,6 +70,7 @@ def plot_sweep(
     if not lines:
         raise ParameterError(f"{table or store} contains no sweep: 'roofbench sweep DETECTOR --vary ...' makes one")
     save_plot(sensitivity_figure(lines, level=level), output, dpi=dpi, overwrite=overwrite)
+    typer.echo(output)
     for line in lines:
         if line.break_down:
             say(break_down_text(line.break_down))

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from ..core.errors import ParameterError
+from ..core.wording import counted
 from .command import load_plugins
 from .console import messages
 from .options import DetectorsOption, IndexOption, OverwriteOption, PluginOption, QuietOption, ScenesOption
@@ -77,7 +78,7 @@ def report(
             level=level,
         )
     size = write_report(filled, output, level=level, overwrite=overwrite)
-    messages(quiet).print(f"{output}: {size / 1e6:.1f} MB, {len(filled.scenes)} scenes drawn", markup=False)
+    messages(quiet).print(f"{output}: {size / 1e6:.1f} MB, {counted(len(filled.scenes), 'scene')} drawn", markup=False)
 
 
 def _compare(

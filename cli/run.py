@@ -10,9 +10,11 @@ from typing import Annotated, Literal
 import typer
 
 from ..core.errors import ParameterError
+from ..core.wording import counted
 from .command import RunOptions, with_run_options
-from .console import messages, table_console
+from .console import messages, print_next, table_console
 from .options import (
+    DEFAULT_STORE,
     DetectorOption,
     DetectorSeedsOption,
     EvaluatorsOption,
@@ -108,12 +110,10 @@ def run(
             for keyed in plan.evaluators
         ]
         known = len(result.rows) - result.done
-        console.print(f"{result.done} runs done, {known} stored before, {len(result.failed)} failed")
+        console.print(f"{counted(result.done, 'run')} done, {known} stored before, {len(result.failed)} failed")
         if plan.left_out:
-            console.print(
-                f"{len(plan.left_out)} runs of the suite are not stored and were left out: run without --retry-failed "
-                "to execute them"
-            )
+            absent = counted(len(plan.left_out), "run of the suite is", "runs of the suite are")
+            console.print(f"{absent} not stored and left out: run without --retry-failed to include them")
         # Files first: the reader of the table may close the pipe (head).
         written = [options.store]
         if output is not None:
@@ -126,15 +126,30 @@ def run(
                 written.append(page)
             else:
                 console.print(
-                    f"{page} is no report of roofbench and was not replaced: name a folder by --output", markup=False
+                    f"{page} is not a report of roofbench and was not replaced: name a folder by --output", markup=False
                 )
         show_leaderboards(boards, form, table_console(), wide=wide)
         unevaluated = [run for board in boards for run in board.unsuccessful if run.status == "not evaluated"]
         print_unsuccessful([*unsuccessful_runs(result.rows), *unevaluated], console)
         console.print(f"written: {', '.join(map(str, written))}", markup=False, soft_wrap=True)
-        following = "roofbench run --resume --retry-failed" if result.failed else "roofbench new detector my-detector"
-        console.print(f"next: {following}", markup=False, soft_wrap=True)
+        again = "--resume --retry-failed" if result.failed else "--resume" if unevaluated else None
+        print_next(console, _next_command(again, options, detector))
         if result.failed or unevaluated:
             raise typer.Exit(3)
         if not any(entry.scenes for board in boards for entry in board.entries):
             raise typer.Exit(4)
+
+
+def _next_command(again: str | None, options: RunOptions, detectors: list[str] | None) -> str:
+    """Return what usually follows: repeat what failed, write a detector, or save reference scores of one's own."""
+    from ..detectors.registry import DETECTORS
+
+    if again:
+        words = ["roofbench", "run", *again.split()]
+        if options.store != DEFAULT_STORE:
+            words += ["--store", str(options.store)]
+        return shlex.join(words)
+    own = [one for one in detectors or () if not DETECTORS.is_builtin(one.partition("[")[0])]
+    if own:
+        return shlex.join(["roofbench", "baseline", "save", "-d", own[0], "-o", "baseline.json"])
+    return "roofbench new detector my-detector"

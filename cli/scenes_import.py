@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .console import messages, print_next
 from .options import GsdOption, JoinGapsOption, OverwriteOption, QuietOption
 from .progress import import_progress
 from .scenes_index import report_index
@@ -163,6 +165,7 @@ def import_(
     with import_progress() as (note, progress):
         scene = import_scene(output, request, overwrite=overwrite, note=None if quiet else note, progress=progress)
     typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.contents)}")
+    print_next(messages(quiet), f"roofbench run {shlex.quote(str(output))}")
 
 
 def _import_tiles(output: Path, request: ImportRequest, overwrite: bool, quiet: bool) -> None:

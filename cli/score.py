@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ..core.errors import ParameterError
+from ..core.wording import counted
 from .command import load_plugins
 from .console import messages, table_console
 from .options import (
@@ -126,7 +127,7 @@ def _check(suite: Suite, folder: Path) -> None:
     for name, problem in problems.items():
         typer.echo(f"{name}: {problem or 'ok'}")
     wrong = sum(map(bool, problems.values()))
-    typer.echo(f"{len(suite.scenes)} scenes, {wrong} problems")
+    typer.echo(f"{counted(len(suite.scenes), 'scene')}, {counted(wrong, 'problem')}")
     if wrong:
         raise typer.Exit(2)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ..core.errors import ParameterError
+from ..core.wording import counted
 from . import completion
 from .command import RunOptions, with_run_options
 from .console import messages, table_console
@@ -121,7 +122,7 @@ def sweep(
     # The file first: the reader of the table may close the pipe (head).
     if output is not None:
         write_sweep_table(table, output, overwrite=overwrite)
-        console.print(f"{output}: {len(table)} rows", markup=False)
+        console.print(f"{output}: {counted(len(table), 'row')}", markup=False)
     if published is None:
         _print(table, planned, shown, form)
     else:

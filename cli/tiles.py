@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from ..core.wording import counted
 from .console import messages, say
 
 if TYPE_CHECKING:
@@ -53,13 +54,13 @@ def detect_tiles(
 
 
 def say_left_out(problems: Sequence[str], consequence: str) -> bool:
-    """Report files that are no part of a scene; return whether there are any."""
+    """Report files that are not part of a scene; return whether there are any."""
     for problem in problems:
         say(f"left out: {problem}")
     if problems:
-        files = "1 file is" if len(problems) == 1 else f"{len(problems)} files are"
+        files = counted(len(problems), "file is", "files are")
         say(
-            f"{files} no part of the scene: repair or remove what is left out, index the folder again, and repeat the "
+            f"{files} not part of the scene: repair or remove what is left out, index the folder again, and repeat the "
             f"command with --overwrite, {consequence}"
         )
     return bool(problems)
@@ -77,7 +78,8 @@ def _say(result: CityResult, output: Path, name: str) -> None:
         )
     if result.skipped:
         first, reason = next(iter(result.skipped.items()))
-        say(f"note: {len(result.skipped)} tiles were skipped, the first at {first.label}: {reason}")
+        skipped = counted(len(result.skipped), "tile was", "tiles were")
+        say(f"note: {skipped} skipped, the first at {first.label}: {reason}")
     reused = f", {result.reused} of them finished before" if result.reused else ""
     memory = f", at most {result.peak_memory / 1e6:.0f} MB in a worker" if result.peak_memory else ""
     say(f"{output}: {result.footprints} footprints of {result.tiles} tiles{reused}{memory}")
@@ -95,7 +97,7 @@ def _progress(options: RunOptions) -> Iterator[Callable[[int, int, Tile, Outcome
 
         def line(done: int, total: int, tile: Tile, outcome: Outcome) -> None:
             left = (time.monotonic() - started) / done * (total - done)
-            found = outcome.reason or f"{len(outcome.detections)} footprints"
+            found = outcome.reason or counted(len(outcome.detections), "footprint")
             screen.print(
                 f"{done} of {total}: tile {tile.label}: {found}; {left:.0f} s left", markup=False, soft_wrap=True
             )

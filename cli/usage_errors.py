@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -14,6 +15,19 @@ __all__ = ["UsageError", "usage_sentence"]
 UsageError: type[Any] = typer.BadParameter.__mro__[1]
 
 _CHOICES = re.compile(r"'(?P<given>[^']*)' is not one of (?P<choices>'.*)")
+#: Names that users expect for an option, each with the options that may be meant.
+_OTHER_NAMES = {
+    "--rank-by": ("--index",),
+    "--scene": ("--scenes",),
+    "--only": ("--scenes",),
+    "--detectors": ("--detector",),
+    "--metric": ("--index",),
+    "--force": ("--overwrite",),
+    "--out": ("--output",),
+    "--workers": ("--jobs",),
+    "--bbox": ("--extent",),
+    "--seed": ("--seeds",),
+}
 _NUMBER = re.compile(r"integer|number|float|range|greater|less|parse")
 
 
@@ -37,7 +51,10 @@ def usage_sentence(error: Any, words: Sequence[str]) -> str:
         name = str(error.option_name)
         if name in ("-p", "--parameter"):
             return f"{path} has no option {name}: write parameters behind the detector, such as -d 'ndsm[height=3]'"
-        return f"{path} has no option {name!r}{_nearest(name, _options(context))}: '{path} -h' lists them"
+        known = _options(context)
+        other = next((one for one in _OTHER_NAMES.get(name, ()) if one in known), None)
+        hint = f" (did you mean {other!r}?)" if other else _nearest(name, known)
+        return f"{path} has no option {name!r}{hint}: '{path} -h' lists them"
     if kind == "BadOptionUsage" and context is not None:
         return _without_value(error, context, path)
     if kind == "BadParameter" and parameter is not None:
@@ -125,12 +142,20 @@ def _number(parameter: Any, message: str) -> str:
     return f"{text} of at most {high:g}" if high is not None else text
 
 
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
 def _given(parameter: Any, words: Sequence[str]) -> str | None:
     """Return the text that an option was given, as far as it can be seen; that of an argument is in the message."""
     for place, word in enumerate(words):
         for name in parameter.opts:
             if word == name and place + 1 < len(words):
-                return words[place + 1]
+                values = words[place + 1 : place + 1 + parameter.nargs] if parameter.nargs > 1 else [words[place + 1]]
+                return next((value for value in values if not _is_number(value)), values[0])
             if name.startswith("--") and word.startswith(f"{name}="):
                 return word.partition("=")[2]
             if len(name) == 2 and name.startswith("-") and word.startswith(name) and not word.startswith("--"):

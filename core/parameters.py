@@ -229,7 +229,10 @@ class Parameterised(Displayed):
         # Before the decorator of dataclasses, which keeps what a class has.
         if "__repr__" not in cls.__dict__:
             cls.__repr__ = Parameterised.__repr__  # type: ignore[method-assign]
-        cls.__doc__ = _DocumentedParameters(cls.__dict__.get("__doc__") or "")  # type: ignore[assignment]
+        own = cls.__dict__.get("__doc__") or ""
+        # With slots, the decorator makes the class a second time.
+        own = own.text if isinstance(own, _Documentation) else own
+        cls.__doc__ = _DocumentedParameters(own)  # type: ignore[assignment]
 
     def __new__(cls, *_: Any, **given: Any) -> Self:
         """Note which parameters are given: a mode sets the others."""
@@ -264,7 +267,9 @@ class Parameterised(Displayed):
     def description(cls) -> str:
         """Return its docstring without the list of parameters that `help` shows."""
         documented = cls.__dict__.get("__doc__")
-        return inspect.cleandoc(documented.text if isinstance(documented, _DocumentedParameters) else documented or "")
+        if isinstance(documented, (_DocumentedParameters, _Documentation)):
+            documented = documented.text
+        return inspect.cleandoc(documented or "")
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
@@ -380,20 +385,37 @@ class Parameterised(Displayed):
 
 
 class _DocumentedParameters:
-    """Docstring of a class, followed by its parameters with unit, range and source; written when it is read."""
+    """Docstring of a class, followed by its parameters with unit, range and source.
+
+    It is written when it is first read, which the decorator of dataclasses does, and then replaced by the text: `help`
+    shows no docstring that is not a string.
+    """
 
     def __init__(self, text: str) -> None:
-        self.text = text
+        self.text: str = text
 
     def __get__(self, instance: Any, owner: type[Parameterised]) -> str:
-        if "__dataclass_params__" not in owner.__dict__:
-            return self.text  # the class is being made
+        current: object = owner.__dict__.get("__doc__")
+        if "__dataclass_fields__" not in owner.__dict__ or current is not self:
+            return self.text  # the class is being made, or it is derived from the documented one
+        try:
+            titles = {"Parameters": owner.parameters(), "Execution options": owner.execution_options()}
+        except (AttributeError, NameError, ParameterError, TypeError):
+            return self.text  # the error is raised where the parameters are used
         sections = [inspect.cleandoc(self.text)]
-        titles = {"Parameters": owner.parameters(), "Execution options": owner.execution_options()}
         for title, rules in titles.items():
             if rules:
                 sections.append("\n".join([title, "-" * len(title), *map(_documented, rules.values())]))
-        return "\n\n".join(filter(None, sections))
+        documentation = _Documentation("\n\n".join(filter(None, sections)))
+        documentation.text = self.text
+        owner.__doc__ = documentation
+        return documentation
+
+
+class _Documentation(str):
+    """A docstring with its parameters; `text` is the part that was written by hand."""
+
+    text: str
 
 
 def _documented(rule: Parameter) -> str:

@@ -143,5 +143,5 @@ def _start_problem(error: OSError) -> str:
     if isinstance(error, PermissionError):
         return "it is not executable: set the permission with chmod +x"
     if "format" in str(error).lower():
-        return "it is no program: a script needs a first line such as #!/bin/sh"
+        return "it is not a program: a script needs a first line such as #!/bin/sh"
     return str(error.strerror)

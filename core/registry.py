@@ -114,6 +114,10 @@ class Registry:
         """Return all names: built in, installed, added."""
         return sorted({*self._builtin, *self._entry_points(), *self._added})
 
+    def is_builtin(self, name: str) -> bool:
+        """Whether a name is that of a class of roofbench itself."""
+        return name in self._builtin
+
     def get(self, name: str) -> type[Any]:
         """Return the class called `name`; ``path/to/file.py:Class`` loads and adds it."""
         if ".py" in name and (":" in name or name.endswith(".py")):

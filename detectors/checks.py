@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from ..core.errors import InputError
+from ..core.wording import counted
 from ..scenes.geodata.crs import crs_label, same_crs
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
@@ -36,9 +37,10 @@ def checked_output(detected: Any, scene: Scene, detector: str) -> Footprints:
     kinds = shapely.get_type_id(polygons)
     wrong = np.flatnonzero(~np.isin(kinds, (3, 6)) | shapely.is_empty(polygons))
     if len(wrong):
+        one, several = "footprint that is empty or not a polygon", "footprints that are empty or not polygons"
         raise InputError(
-            f"{detector} returned {len(wrong)} footprints that are empty or no polygons, the first is number "
-            f"{wrong[0]}: build them by Footprints.of, which reports and drops such"
+            f"{detector} returned {counted(len(wrong), one, several)}, the first is number {wrong[0]}: build "
+            "them by Footprints.of, which reports and drops such footprints"
         )
     wrong = np.flatnonzero(~np.isfinite(shapely.bounds(polygons)).all(axis=-1))
     if len(wrong):
@@ -47,7 +49,7 @@ def checked_output(detected: Any, scene: Scene, detector: str) -> Footprints:
     if len(wrong):
         reason = shapely.is_valid_reason(polygons[wrong[0]])
         raise InputError(
-            f"{detector} returned {len(wrong)} invalid polygons, the first is number {wrong[0]} ({reason}): "
+            f"{detector} returned {counted(len(wrong), 'invalid polygon')}, the first is number {wrong[0]} ({reason}): "
             "build them by Footprints.of, which repairs them"
         )
     if detected.crs is not None and scene.crs is not None and not same_crs(detected.crs, scene.crs):
@@ -62,7 +64,7 @@ def checked_output(detected: Any, scene: Scene, detector: str) -> Footprints:
         if len(wrong):
             found = ", ".join(f"{value:.1f}" for value in shapely.bounds(polygons[wrong[0]]))
             raise InputError(
-                f"{detector} returned {len(wrong)} footprints outside the extent of scene {scene.name!r}, the first is "
-                f"number {wrong[0]} at [{found}]: return map coordinates, not pixels"
+                f"{detector} returned {counted(len(wrong), 'footprint')} outside the extent of scene {scene.name!r}, "
+                f"the first is number {wrong[0]} at [{found}]: return map coordinates, not pixels"
             )
     return dataclasses.replace(detected, crs=scene.crs)

@@ -24,6 +24,7 @@ from ..core.display import Displayed
 from ..core.errors import InputError, ParameterError, UnknownNameError
 from ..core.parameters import Parameterised
 from ..core.registry import nearest_hint
+from ..core.wording import counted
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.geodata.raster import Grid
 from .index import Better, Curve, Index, IndexGroup
@@ -237,7 +238,7 @@ class Evaluator(Parameterised, ABC):
                     "set of parameters"
                 )
         tallies = functools.reduce(operator.add, [evaluation.tallies for evaluation in every])
-        return self.summarise(tallies, [f"pooled over {len(every)} evaluations"])
+        return self.summarise(tallies, [f"pooled over {counted(len(every), 'evaluation')}"])
 
     @classmethod
     def index(cls, name: str) -> Index:

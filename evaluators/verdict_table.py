@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from ..core.display import Displayed
 from ..core.errors import InputError
+from ..core.wording import counted
 from ..scenes.geodata.footprints import Footprints
 
 if TYPE_CHECKING:
@@ -370,9 +371,8 @@ class Verdicts(Displayed):
     def __post_init__(self) -> None:
         for side, table, footprints in self.sides:
             if len(table) != len(footprints):
-                raise InputError(
-                    f"{len(table)} verdicts for {len(footprints)} {side}s: they are of another set of footprints"
-                )
+                numbers = f"{counted(len(table), 'verdict')} for {counted(len(footprints), side)}"
+                raise InputError(f"{numbers}: they are of another set of footprints")
             unknown = set(table.kinds) - {kind.key for kind in self.kinds_of(side)}
             if unknown:
                 raise InputError(

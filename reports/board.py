@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, ParamSpec, Self
 
 from ..benchmark import session
 from ..benchmark.analysis.results import Leaderboard
-from .format import counted, index_name
+from ..core.wording import counted
+from .format import index_name
 from .leaderboard_text import leaderboard_data, leaderboard_markdown, scene_table, summary_caption, summary_table
 
 if TYPE_CHECKING:

@@ -8,9 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..benchmark.analysis.report_data import PooledCurves
+from ..core.wording import counted
 from ..evaluators.index import Curve
 from .charts import legend_below
-from .format import counted, shortened, unit_text
+from .format import shortened, unit_text
 from .inline_svg import SERIES, new_figure, style_axes
 
 __all__ = ["curves_figure"]

@@ -9,8 +9,9 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from ..core.wording import counted
 from ..evaluators.base import Evaluation, Index
-from .format import counted, interval_text, value_text
+from .format import interval_text, value_text
 from .tables import Column, Table, escaped_markdown
 
 if TYPE_CHECKING:  # an evaluation without intervals must not wait for sparse matrices
@@ -157,7 +158,7 @@ def _doubt_notes(uncertainty: Uncertainty | None) -> Iterator[str]:
         redrawn = uncertainty.redraws
         yield (
             f"reference ±{redrawn.error:g} m: the change that 95 % of {counted(redrawn.redraws, 'redraw')} of the "
-            "reference do not exceed; a smaller difference between two detections is not believed"
+            "reference do not exceed; a smaller difference between two detections is not reliable"
         )
 
 
@@ -170,4 +171,8 @@ def described(evaluation: Evaluation) -> str:
 def _counts_line(evaluation: Evaluation) -> str:
     """Return the objects behind the figures."""
     counts = {key: value for key, value in evaluation.tallies.to_dict().items() if key.startswith("counts.")}
-    return " · ".join(f"{value:,} {key.removeprefix('counts.').replace('_', ' ')}" for key, value in counts.items())
+    return " · ".join(_count(value, key.removeprefix("counts.").replace("_", " ")) for key, value in counts.items())
+
+
+def _count(value: int, nouns: str) -> str:
+    return counted(value, nouns.removesuffix("s"), nouns)

@@ -17,7 +17,6 @@ __all__ = [
     "cell_width",
     "column_head",
     "column_title",
-    "counted",
     "index_name",
     "interval_text",
     "listed",
@@ -114,15 +113,6 @@ def column_head(index: Index) -> tuple[str, ...]:
 def index_name(index: Index) -> str:
     """Return an index in words with its symbol: ``quality (Q_l)``."""
     return f"{index.title} ({index.symbol})" if index.symbol else index.title
-
-
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun.
-
-    >>> counted(1, "scene"), counted(1200, "scene")
-    ('1 scene', '1,200 scenes')
-    """
-    return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
 def listed(parts: Sequence[str]) -> str:

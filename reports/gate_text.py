@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import Literal
 
 from ..benchmark.analysis.results import CONCLUSIONS, GateResult, IndexConclusion
-from .format import column_title, counted, interval_text, number_text, value_text
+from ..core.wording import counted
+from .format import column_title, interval_text, number_text, value_text
 from .tables import Column, Table, escaped_markdown
 
 __all__ = ["format_gate", "gate_summary"]
@@ -25,7 +26,7 @@ def gate_summary(result: GateResult) -> str:
     counts = {name: sum(found.conclusion == name for found in result.conclusions) for name in CONCLUSIONS}
     words = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
     if result.failures:
-        words += f", {len(result.failures)} runs failed that did not fail before"
+        words += f", {counted(len(result.failures), 'run')} failed that did not fail before"
     return {0: "passed", 1: "regression", 4: "nothing could be measured"}[result.exit_code] + f": {words}"
 
 

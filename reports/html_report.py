@@ -28,10 +28,11 @@ from ..benchmark.store.records import RunRow
 from ..benchmark.store.writer import Store
 from ..core.output import whole_file
 from ..core.package import VERSION
+from ..core.wording import counted
 from ..evaluators.base import Index
 from .charts import cost_figure, size_figure
 from .curve_charts import curves_figure
-from .format import counted, interval_text, listed, number_text, shortened, unit_text, value_text
+from .format import interval_text, listed, number_text, shortened, unit_text, value_text
 from .gate_text import gate_summary
 from .inline_svg import to_inline_svg
 from .leaderboard_text import leaderboard_caption

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Literal
 
 from ..benchmark.analysis.results import Entry, Leaderboard, UnsuccessfulRun
 from ..core.output import whole_file
-from .format import column_head, column_title, counted, index_name, interval_text, number_text, unit_text
+from ..core.wording import counted
+from .format import column_head, column_title, index_name, interval_text, number_text, unit_text
 from .tables import Column, Table, escaped_markdown
 
 if TYPE_CHECKING:

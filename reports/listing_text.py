@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 from ..benchmark.store.listing import Listing, Sizes
+from ..core.wording import counted
 from .format import number_text
 from .tables import Column, Table
 
@@ -34,7 +35,7 @@ def format_listing(listing: Listing, form: Literal["table", "csv", "json"]) -> I
 def _table(listing: Listing) -> Iterator[str]:
     sizes = listing.sizes()
     yield from _lines(listing, sizes) if sizes.ascii else _cells(listing)
-    yield f"{sizes.count} of {listing.total} runs in {listing.path}\n"
+    yield f"{sizes.count} of {counted(listing.total, 'run')} in {listing.path}\n"
 
 
 def _lines(listing: Listing, sizes: Sizes) -> Iterator[str]:

@@ -13,6 +13,7 @@ import shapely
 
 from ..benchmark.execution.scene_picture import scene_picture
 from ..core.parameters import Parameter, Parameterised, parameter_text
+from ..core.wording import counted
 from ..detectors.base import Detector
 from ..evaluators.base import Evaluation
 from ..evaluators.comparison import Evaluations
@@ -22,7 +23,6 @@ from ..scenes.geodata.crs import crs_label
 from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import Scene
 from .evaluation_text import described, evaluation_table
-from .format import counted
 from .overlay_json import data_uri
 from .pair_text import differences_table, fates_table, objects_line
 from .svg_map import MapLayer, crowded_window, svg_map
@@ -57,7 +57,7 @@ def footprints_view(footprints: Footprints) -> str:
     ]
     notes = [*map(str, footprints.repairs[:5]), *map(str, footprints.metadata.get("notes", ()))]
     layers = [MapLayer(footprints.polygons, _BLUE, _BLUE, 0.35)]
-    return _beside(_map(layers, f"{len(footprints)} footprints"), [_facts(facts), _notes(notes)])
+    return _beside(_map(layers, counted(len(footprints), "footprint")), [_facts(facts), _notes(notes)])
 
 
 def verdicts_view(verdicts: Verdicts) -> str:

@@ -6,9 +6,10 @@ import json
 from collections.abc import Iterable
 from typing import Literal, TypeAlias
 
+from ..core.wording import counted
 from ..evaluators.uncertainty.paired import Difference, Fate, PairedComparison
 from .evaluation_text import described
-from .format import column_title, counted, interval_text, number_text, value_text
+from .format import column_title, interval_text, number_text, value_text
 from .tables import Column, Table, escaped_markdown
 
 __all__ = ["FATE_WORDS", "Form", "differences_table", "fates_table", "format_pair", "objects_line"]
@@ -123,7 +124,7 @@ def _notes(found: PairedComparison, *, markdown: bool) -> list[str]:
         else (
             f"redrawn: 95 % of {found.redrawn.redraws} redraws of the reference, its corners moved by "
             f"±{found.redrawn.error:g} m, change the difference by no more than this; "
-            "a smaller difference is not believed",
+            "a smaller difference is not reliable",
         )
     )
     evaluations = (("A", found.first), ("B", found.second))

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Literal
 
 from ..benchmark.plan import Plan
+from ..core.wording import counted
 from .tables import Column, Table
 
 __all__ = ["format_plan"]
@@ -43,4 +44,4 @@ def _numbers(plan: Plan) -> str:
         *([f"{skipped} to skip"] if skipped else []),
         *([f"{left_out} left out"] if left_out else []),
     ]
-    return f"{len(plan.runs)} runs: {', '.join(parts)}"
+    return f"{counted(len(plan.runs), 'run')}: {', '.join(parts)}"

@@ -7,6 +7,7 @@ import os
 from ..benchmark.store.stored_verdicts import stored_verdicts
 from ..benchmark.store.writer import Store
 from ..core.errors import InputError
+from ..core.wording import counted
 from ..scenes.geodata.vector_files import write_footprints
 from .verdict_layers import write_verdicts
 
@@ -44,7 +45,8 @@ def export_run(
             verdicts = stored_verdicts(store, run_id, recipe.evaluator(), key)
             if verdicts is not None:
                 write_verdicts(verdicts, path, overwrite=overwrite)
-                return f"{len(verdicts.detected)} detections, {len(verdicts.reference)} references by {recipe.use}"
+                found, truth = len(verdicts.detected), len(verdicts.reference)
+                return f"{counted(found, 'detection')}, {counted(truth, 'reference')} by {recipe.use}"
     detected = store.detections(run_id)
     write_footprints(detected, path, layer="detections", overwrite=overwrite)
-    return f"{len(detected)} detections"
+    return counted(len(detected), "detection")

@@ -9,6 +9,7 @@ from ..benchmark.plan import differences, identity_now
 from ..benchmark.store.records import RunRow
 from ..benchmark.store.writer import Store
 from ..core.errors import RoofbenchError
+from ..core.wording import counted
 from .format import one_line
 
 __all__ = ["format_run"]
@@ -25,7 +26,7 @@ def format_run(store: Store, row: RunRow) -> str:
         *(f"  note       {one_line(str(note))}" for note in store.run_notes([row.id]).get(row.id, ())),
         *_evaluations(store, row),
         f"  seed       {row.seed}",
-        f"  code       roofbench {row.version}, {len(code.modules)} modules, digest {code.digest[:16]}",
+        f"  code       roofbench {row.version}, {counted(len(code.modules), 'module')}, digest {code.digest[:16]}",
         f"  benchmark  {'not recorded' if row.benchmark is None else f'version {row.benchmark}'}",
         f"  packages   {', '.join(f'{name} {version}' for name, version in code.packages.items())}",
         f"  cost       {row.seconds:.3f} s, CPU {row.cpu_seconds:.3f} s, {row.peak_memory / 1e6:.0f} MB",
@@ -55,7 +56,7 @@ def _changes(store: Store, row: RunRow) -> str:
     try:
         changes = differences(store, row.id, identity_now(row))
     except RoofbenchError as error:
-        return f"It cannot be made again here: {error}"
+        return f"It cannot be repeated here: {error}"
     if changes:
         return "It would be run again: " + "; ".join(changes) + "."
     if row.status == "failed":

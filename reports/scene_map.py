@@ -19,6 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from ..core.wording import counted
 from ..scenes.geodata.crs import crs_label
 from ..scenes.geodata.density import point_spacing
 from ..scenes.geodata.raster import Elevation, Grid
@@ -139,7 +140,7 @@ def _draw_reference(axes: Axes, scene: Scene, surface: Elevation | None) -> None
         shapes = list(polygon_paths(scene.reference.polygons))
         axes.add_collection(PathCollection(shapes, facecolor=fill, edgecolor=_REFERENCE, linewidth=0.7))
         buildings = len(np.unique(scene.reference.building_codes))
-        title = f"Reference: {len(scene.reference)} footprints, {buildings} building{'s' * (buildings != 1)}"
+        title = f"Reference: {counted(len(scene.reference), 'footprint')}, {counted(buildings, 'building')}"
         handles.append(Patch(facecolor=fill, edgecolor=_REFERENCE, label="reference"))
     if scene.area is not None:
         border = list(polygon_paths([scene.area]))

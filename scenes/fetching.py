@@ -109,7 +109,7 @@ def open_data(name: str) -> OpenData:
         content["pages"] = tuple(content.get("pages", ()))
         found = OpenData(**{"name": path.stem, "building_id": "", "values": {}, "tried": "not known", **content})
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
-        raise InputError(f"{path} is no recipe: {error}") from error
+        raise InputError(f"{path} is not a recipe: {error}") from error
     for file in found.files:
         unknown = file.fields - {*_EXTENT, *found.values}
         if unknown or file.kind not in get_args(_Kind):
@@ -260,7 +260,7 @@ def _unpacked(path: Path, note: Callable[[str], None]) -> list[Path]:
                     note(f"{target}: unpacked")
                 members.append(target)
     except zipfile.BadZipFile as error:
-        raise InputError(f"{path} is no archive: {error}") from error
+        raise InputError(f"{path} is not an archive: {error}") from error
     if not members:
         raise InputError(f"{path} holds no points, vectors or rasters")
     return members

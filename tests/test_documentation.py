@@ -1,5 +1,6 @@
 """README and docs: every relative link and picture is there, and the version is stated once."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -136,6 +137,13 @@ PLAIN = {
     r"(?<![a-z])incidents?(?![a-z])": "failure or skip",
     r"(?<![a-z])knobs?(?![a-z])": "parameter",
     r"is the dearer|times dearer": "more expensive",
+    r"\btells? [a-z ]+ from (trees|roofs|buildings|crowns)": "separates",
+    r"(?<![a-z])booked(?![a-z])": "assigned",
+    r"where no land is": "implausible heights",
+    r"memory does not suffice": "out of memory",
+    r"(is|are|be) (not )?believed": "reliable",
+    r"with their fate": "outcome",
+    r"\b(thereof|whereby|hereby|wherein|therein|albeit|whilst|amongst|lest|hitherto|forthwith)\b": "a plain word",
 }
 TEXTS = [
     path
@@ -155,6 +163,37 @@ def test_the_texts_are_in_plain_english(phrase):
         if re.search(phrase, line, re.IGNORECASE)
     ]
     assert found == [], f"write: {PLAIN[phrase]}"
+
+
+def texts_of_code():
+    """Yield place and text of every string that is no docstring; braces stand for values."""
+    for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        inside = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+        inside |= {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.JoinedStr):
+                parts = (part.value if isinstance(part, ast.Constant) else "{}" for part in node.values)
+                yield f"{path.relative_to(ROOT)}:{node.lineno}", "".join(parts)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in inside:
+                yield f"{path.relative_to(ROOT)}:{node.lineno}", node.value
+
+
+@pytest.mark.parametrize(
+    ("phrase", "instead"),
+    [
+        (r"(\{\}|\bit) is no (?!longer|such|more)[a-z]", "is not a ..."),
+        (r" and no (scene|suite|metres|pixels)\b", ", not a ..."),
+        (r"\bnam(e|es|ed) no (CRS|coordinate)", "has no CRS"),
+        (
+            r"(^|, )\{\} (runs|problems|scenes|files|tiles|rows|detections|pairs|modules|footprints)\b",
+            "counted()",
+        ),
+    ],
+)
+def test_messages_are_in_plain_english(phrase, instead):
+    found = [f"{place}: {text}" for place, text in texts_of_code() if re.search(phrase, text)]
+    assert found == [], f"write: {instead}"
 
 
 def test_the_generated_pages_are_those_of_the_code(monkeypatch):

@@ -232,7 +232,7 @@ class Baseline:
             if isinstance(error, InputError):
                 raise
             missing = f"it has no {error}" if isinstance(error, KeyError) else str(error)
-            raise InputError(f"{file} is no baseline ({missing}): 'roofbench baseline save' makes one") from error
+            raise InputError(f"{file} is not a baseline ({missing}): 'roofbench baseline save' makes one") from error
 
     @classmethod
     def _from(cls, content: Mapping[str, Any]) -> Self:

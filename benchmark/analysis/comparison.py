@@ -6,6 +6,7 @@ import statistics
 from collections.abc import Mapping
 
 from ...core.errors import InputError
+from ...core.wording import counted
 from ...evaluators.base import Index
 from ..plan import KeyedEvaluator
 from ..store.records import RunRow
@@ -73,7 +74,7 @@ def compare_stores(
     for name, cells, other in (("A", one, two), ("B", two, one)):
         alone = cells.keys() - other.keys()
         if alone:
-            notes.append(f"only in {name}: {len(alone)} pairs of detector and scene, not compared")
+            notes.append(f"only in {name}: {counted(len(alone), 'pair')} of detector and scene, not compared")
     return StoreComparison(
         first=first.path.name, second=second.path.name, evaluator=common, rows=tuple(found), notes=tuple(notes)
     )

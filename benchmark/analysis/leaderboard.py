@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.parameters import parameter_text
 from ...core.resampling import expanded_level, resampling_weights
+from ...core.wording import counted
 from ...detectors.registry import DETECTORS
 from ...evaluators.base import Evaluation, Evaluator, Index
 from ...evaluators.tally import Tallies
@@ -138,7 +139,8 @@ def _common_scenes(rows: Sequence[RunRow]) -> tuple[tuple[str, ...], list[str]]:
     if not skipped or not common:
         return scenes, []
     lacking = "; ".join(f"{scene} (skipped by {', '.join(labels)})" for scene, labels in skipped.items())
-    return common, [f"Values are over the {len(common)} scenes that all detectors can use, without {lacking}"]
+    used = counted(len(common), "scene")
+    return common, [f"Values are over the {used} that all detectors can use, without {lacking}"]
 
 
 def _by_scene(

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 
 from ...core.errors import InputError, RoofbenchError
+from ...core.wording import counted
 from ...evaluators.base import Evaluator
 from ...evaluators.registry import DEFAULT, make_evaluator
 from ..identity.provenance import code_version
@@ -244,7 +245,7 @@ def _provenance(store: Store, rows: Sequence[RunRow]) -> Provenance:
         ("version of the benchmark", ", ".join(version_names(rows))),
         ("command", "; ".join(store.commands()) or "not kept"),
         ("runs", f"{len(rows):,} from {min(row.finished for row in rows)} to {max(row.finished for row in rows)}"),
-        ("store", f"{store.path.name}, {store.count_runs():,} runs in all"),
+        ("store", f"{store.path.name}, {counted(store.count_runs(), 'run')} in all"),
         ("detectors", ", ".join(dict.fromkeys(row.label for row in rows))[:2000]),
         ("detector seeds", ", ".join(map(str, seeds[:20])) + (", …" if len(seeds) > 20 else "")),
         ("machine", ", ".join(f"{name} {value}" for name, value in machine.items()) or "not known"),

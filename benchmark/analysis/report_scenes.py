@@ -162,7 +162,7 @@ def _worst(views: Sequence[SceneView]) -> tuple[Error, ...]:
 
 
 def _wrong_areas(verdicts: Verdicts) -> dict[Side, NDArray[np.float64]]:
-    """Return the area that is wrong about each object, m2; a matched pair is booked on its detection."""
+    """Return the area that is wrong about each object, m2; a matched pair is assigned to its detection."""
     wrong = {}
     for side, table, footprints in verdicts.sides:
         kinds = verdicts.kinds_of(side)

@@ -93,7 +93,7 @@ def cluster_slot(address: str) -> Iterator[Slot]:
         raise UnsupportedError("scheduler= needs Dask: pip install 'dask[distributed]'") from error
     # Without a port, Client would wait for half a minute before it gives up. Clusters within this process have none.
     if not address.startswith("inproc://") and not re.search(r":\d+/?$", address):
-        raise InputError(f"{address!r} is no address of a Dask scheduler: write tcp://HOST:PORT")
+        raise InputError(f"{address!r} is not the address of a Dask scheduler: write tcp://HOST:PORT")
     try:
         client = Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -21,6 +21,7 @@ from shapely import Geometry
 from ...core.errors import InputError, MissingInputError
 from ...core.memory import reset_highest_memory
 from ...core.plain_values import plain_value
+from ...core.wording import counted
 from ...detectors.base import Declaration, Detector
 from ...detectors.checks import checked_output
 from ...detectors.external.precomputed import Precomputed
@@ -214,9 +215,11 @@ def execute(
 def _refuse_incomplete(scene: Scene) -> None:
     """Refuse to score a scene of which files are missing: their buildings would count as not detected."""
     if scene.left_out:
-        count, first = len(scene.left_out), scene.left_out[0]
-        files = "one file is no part of the scene" if count == 1 else f"{count} files are no part of the scene, first"
-        raise InputError(f"{files}: {first}; repair or remove what is left out, and index the folder again")
+        files = counted(len(scene.left_out), "file is", "files are")
+        raise InputError(
+            f"{files} not part of the scene, first {scene.left_out[0]}; repair or remove what is left out, "
+            "and index the folder again"
+        )
 
 
 def _window_key(recipe: SceneRecipe, part: TilePart) -> str:

@@ -84,19 +84,24 @@ class DempsterShafer(Detector):
         None, unit="m", minimum=0.2, maximum=5, doc="cell size; none: 1.4 times the point spacing, 0.5 to 2 m"
     )
     low_height: float = parameter(
-        1.5, unit="m", minimum=0, maximum=20, doc="height up to which a cell is no building or tree", source="reading"
+        1.5,
+        unit="m",
+        minimum=0,
+        maximum=20,
+        doc="height up to which a cell is neither building nor tree",
+        source="reading",
     )
     high_height: float = parameter(
         3.0, unit="m", minimum=0, maximum=50, doc="height from which a cell is a building or tree", source="reading"
     )
     low_difference: float = parameter(
-        1.5, unit="m", minimum=0, maximum=20, doc="pulse difference up to which a cell is no tree", source="reading"
+        1.5, unit="m", minimum=0, maximum=20, doc="pulse difference up to which a cell is not a tree", source="reading"
     )
     high_difference: float = parameter(
         3.0, unit="m", minimum=0, maximum=50, doc="pulse difference from which a cell is a tree", source="reading"
     )
     low_ndvi: float = parameter(
-        0.1, minimum=-1, maximum=1, doc="(NIR - R) / (NIR + R) up to which a cell is no vegetation", source="reading"
+        0.1, minimum=-1, maximum=1, doc="(NIR - R) / (NIR + R) up to which a cell is not vegetation", source="reading"
     )
     high_ndvi: float = parameter(
         0.4, minimum=-1, maximum=1, doc="(NIR - R) / (NIR + R) from which a cell is vegetation", source="reading"
@@ -114,7 +119,7 @@ class DempsterShafer(Detector):
         2.0, unit="1/m", minimum=0, doc="texture strength from which a surface is that of a tree", source="reading"
     )
     low_directedness: float = parameter(
-        0.3, minimum=0, maximum=1, doc="directedness up to which a rough surface is no tree", source="reading"
+        0.3, minimum=0, maximum=1, doc="directedness up to which a rough surface is not a tree", source="reading"
     )
     high_directedness: float = parameter(
         0.9, minimum=0, maximum=1, doc="directedness from which a rough surface is a tree", source="reading"
@@ -135,7 +140,7 @@ class DempsterShafer(Detector):
         0.1, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel are ignored: shadow"
     )
     opening: float = parameter(
-        1.0, unit="m", minimum=0, maximum=10, doc="radius of the opening that parts thin bridges", source="reading"
+        1.0, unit="m", minimum=0, maximum=10, doc="radius of the opening that removes thin bridges", source="reading"
     )
     smallest_area: float = parameter(10.0, unit="m2", minimum=0, doc="least area of a region", source="reading")
     second_pass: bool = parameter(True, doc="decide again for each region", source=_SOURCE)

@@ -85,7 +85,7 @@ def fusion_steps(trace: FusionTrace) -> Iterator[Step]:
     regions = (
         Category("", Role.BACKGROUND),
         Category("removed: opening or minimum area", Role.SMALL),
-        Category("region refused by the second pass", Role.REMOVED),
+        Category("region rejected by the second pass", Role.REMOVED),
         Category("accepted region", Role.SOLID),
     )
     yield _map(trace, "regions", "Building cells by what became of them.", ClassRaster(changes, extent, regions))

@@ -42,7 +42,9 @@ class Precomputed(Detector):
             raise ParameterError("precomputed: folder must name the folder with one vector file for each scene")
         object.__setattr__(self, "folder", os.path.abspath(self.folder))
         if not Path(self.folder).is_dir():
-            raise ParameterError(f"precomputed: {self.folder} is no folder: name one with a vector file for each scene")
+            raise ParameterError(
+                f"precomputed: {self.folder} is not a folder: name one with a vector file for each scene"
+            )
 
     def own_label(self) -> str:
         """Return the name in tables."""

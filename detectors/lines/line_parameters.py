@@ -115,7 +115,7 @@ class LineParameters(Detector):
     )  # fmt: skip
     corner_angle: float = parameter(
         157.0, unit="deg", minimum=90, maximum=180,
-        doc="interior angles from this value to 360 minus it (203) are no corner", source="CPDA, 2009",
+        doc="interior angles from this value to 360 minus it (203) are not corners", source="CPDA, 2009",
     )  # fmt: skip
     missed_corner: float | None = parameter(
         None, unit="m", minimum=0.01,
@@ -260,7 +260,7 @@ class LineParameters(Detector):
         source="2010, 3.4.2",
     )
     rise: float = parameter(
-        0.1, minimum=0, maximum=1, doc="largest increase of primary black that is no rise; 0 as printed",
+        0.1, minimum=0, maximum=1, doc="largest increase of primary black that does not count as a rise; 0 as printed",
         source="2010, 3.4.2; reading",
     )  # fmt: skip
     rise_from: str = parameter(

@@ -43,7 +43,7 @@ def mpp_steps(prepared: Prepared, buildings: NDArray[np.object_], trace: Mapping
     yield _map(
         prepared,
         "evidence",
-        "What each cell adds to a rectangle: positive values support a roof, negative ones speak against it.",
+        "What each cell adds to a rectangle: positive values support a roof, negative ones count against it.",
         ValueRaster(prepared.score / MILLI, extent, evidence),
     )
     boxes = shapely.polygons(to_world(prepared.boxes.rectangles, prepared.grid))

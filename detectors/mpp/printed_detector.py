@@ -141,7 +141,7 @@ class MPPPrinted(Detector):
     prior_limit: float | None = parameter(
         None,
         minimum=0.1,
-        doc="marks further than this many standard deviations from their prior's mean are refused; none: as printed",
+        doc="marks further than this many standard deviations from their prior's mean are rejected; none: as printed",
         source="roofbench, a reading of the Gaussian priors of equation 5",
     )
     overlap_share: float = parameter(

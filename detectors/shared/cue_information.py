@@ -90,10 +90,10 @@ def informative_cues(
     untested = _GEOMETRIC | set(independent)
     values = {name: np.where(among, rating, np.float32(np.nan))[among] for name, rating in ratings.items()}
     silent = dict(known_silent)
-    silent |= {name: "the points do not hold it" for name, rating in values.items() if not np.isfinite(rating).any()}
+    silent |= {name: "the points do not record it" for name, rating in values.items() if not np.isfinite(rating).any()}
     for name in sorted(untested - {ANCHOR} - silent.keys()):
         if name in values and _is_constant(values[name]):
-            silent[name] = "it says the same everywhere"
+            silent[name] = "it has the same value everywhere"
     used = [name for name in values if name not in silent]
     while True:
         tested = {
@@ -103,7 +103,7 @@ def informative_cues(
         if not failed or len(used) < 2:
             return CueInformation(tuple(used), silent)
         worst = min(failed, key=failed.__getitem__)
-        silent[worst] = f"it says the same of roofs and trees (separation {failed[worst]:.2f} of 2)"
+        silent[worst] = f"it does not separate roofs from trees (separation {failed[worst]:.2f} of 2)"
         used.remove(worst)
 
 

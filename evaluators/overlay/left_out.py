@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...core.wording import counted
 from ...scenes.geodata.footprints import Footprints
 from ..tally import Tallies
 from .overlaps import Overlaps, shared_areas
@@ -30,7 +31,6 @@ __all__ = [
     "clipped",
     "counted_detections",
     "counted_references",
-    "in_words",
     "left_out_notes",
     "remeasured",
     "repair_notes",
@@ -186,26 +186,17 @@ def remeasured(footprints: Footprints, within: Overlaps) -> Overlaps:
     return Overlaps(within.first, within.second, area, within.significant)
 
 
-def in_words(count: int, noun: str) -> str:
-    """Return a number with its noun.
-
-    >>> in_words(1, "reference"), in_words(3, "reference")
-    ('1 reference', '3 references')
-    """
-    return f"{count:d} {noun}" if count == 1 else f"{count:d} {noun}s"
-
-
 def left_out_notes(left_out: LeftOut) -> Iterator[str]:
     """Yield what was left out, in words."""
     if left_out.detected:
         yield (
-            f"{in_words(left_out.detected, 'detection')} left out: outside the evaluation area, "
+            f"{counted(left_out.detected, 'detection')} left out: outside the evaluation area, "
             "or on references that are left out"
         )
     if left_out.reference_outside:
-        yield f"{in_words(left_out.reference_outside, 'reference')} outside the evaluation area left out"
+        yield f"{counted(left_out.reference_outside, 'reference')} outside the evaluation area left out"
     if left_out.reference_small:
-        yield f"{in_words(left_out.reference_small, 'reference')} below the minimum area left out"
+        yield f"{counted(left_out.reference_small, 'reference')} below the minimum area left out"
 
 
 def repair_notes(*sets: Footprints) -> Iterator[str]:
@@ -214,4 +205,4 @@ def repair_notes(*sets: Footprints) -> Iterator[str]:
         for action in dict.fromkeys(repair.action for repair in footprints.repairs):
             ids = [str(repair.id) for repair in footprints.repairs if repair.action == action]
             more = f" and {len(ids) - 10} more" if len(ids) > 10 else ""
-            yield f"{footprints.source}: {in_words(len(ids), 'feature')} {action}: {', '.join(ids[:10])}{more}"
+            yield f"{footprints.source}: {counted(len(ids), 'feature')} {action}: {', '.join(ids[:10])}{more}"

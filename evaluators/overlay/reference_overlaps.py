@@ -11,8 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.wording import counted
 from ...scenes.geodata.footprints import Footprints
-from .left_out import Objects, in_words, repair_notes
+from .left_out import Objects, repair_notes
 from .overlaps import Overlaps, overlaps_within
 
 __all__ = ["input_notes", "reference_overlap_notes", "reference_warnings"]
@@ -97,4 +98,4 @@ def reference_overlap_notes(reference: Objects, within: Overlaps) -> Iterator[st
 
 
 def _pairs(rows: NDArray[np.bool_]) -> str:
-    return in_words(int(rows.sum()), "pair")
+    return counted(int(rows.sum()), "pair")

@@ -106,7 +106,7 @@ def loss_by_cause(graph: ObjectGraph, *, area: Any = None, rim: float = _RIM) ->
     near = _area(shapely.intersection(open_added, shapely.buffer(own, rim)))
     unmatched = reference[graph.references.mask & (match.of_reference < 0)]
     covered = _area(shapely.intersection(unmatched, all_detected))
-    alone = np.flatnonzero(graph.detections.mask & (match.booked_on < 0))
+    alone = np.flatnonzero(graph.detections.mask & (match.assigned_to < 0))
     return LossByCause(
         split=max(_area(omitted) - _area(open_omitted), 0.0),
         merged=max(_area(added) - _area(open_added), 0.0) + covered,

@@ -5,7 +5,7 @@ threshold (Awrangjeb et al. 2010, section 4.1). Then
 
 - TP: matched pairs;
 - FP: detections that overlap no reference;
-- MD (multiple detection): unmatched detections that overlap a reference, booked on the nearest one;
+- MD (multiple detection): unmatched detections that overlap a reference, assigned to the nearest one;
 - FN: unmatched references;
 
 so TP + FP + MD is the number of detections and TP + FN the number of references.
@@ -40,13 +40,13 @@ class Correspondence:
         Row of the matched reference, or -1.
     of_reference : ndarray of int64, shape (number of references,)
         Row of the matched detection, or -1.
-    booked_on : ndarray of int64, shape (number of detections,)
+    assigned_to : ndarray of int64, shape (number of detections,)
         Row of the nearest overlapped reference (for multiple detections), or -1 where there is none.
     """
 
     of_detection: NDArray[np.int64]
     of_reference: NDArray[np.int64]
-    booked_on: NDArray[np.int64]
+    assigned_to: NDArray[np.int64]
 
     @property
     def pairs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

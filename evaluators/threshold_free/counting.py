@@ -27,7 +27,7 @@ def count_objects(graph: OverlapGraph) -> Counts:
     overlaps, within = graph.overlaps, graph.within[0].only_significant
     partner, building = graph.correspondence.of_detection, graph.reference.building_codes
     matched = partner >= 0
-    multiple = graph.detections.mask & ~matched & (graph.correspondence.booked_on >= 0)
+    multiple = graph.detections.mask & ~matched & (graph.correspondence.assigned_to >= 0)
 
     both = graph.detections.mask[within.first] & graph.detections.mask[within.second]
     one, two = within.first[both], within.second[both]
@@ -116,7 +116,7 @@ def measure_areas(
     """
     match, overlaps, within = graph.correspondence, graph.overlaps, graph.within
     pairs = match.pairs
-    false_positives = np.flatnonzero(graph.detections.mask & (match.booked_on < 0))
+    false_positives = np.flatnonzero(graph.detections.mask & (match.assigned_to < 0))
     false_negatives = np.flatnonzero(graph.references.mask & (match.of_reference < 0))
     shared = overlaps.area[graph.matched_overlaps]
     if area is not None:

@@ -233,4 +233,4 @@ def _notes(tallies: ThresholdFreeTallies) -> Iterator[str]:
     yield from left_out_notes(tallies.left_out)
     pairs, by_corners = tallies.geometric.pairs, tallies.geometric.pairs_by_corners
     if pairs > by_corners:
-        yield f"RMSE uses PoLiS for {pairs - by_corners} of {pairs} pairs, whose outlines are no rectangles"
+        yield f"RMSE uses PoLiS for {pairs - by_corners} of {pairs} pairs, whose outlines are not rectangles"

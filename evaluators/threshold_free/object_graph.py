@@ -76,9 +76,9 @@ class OverlapGraph:
         The other multiple detections are pieces of a reference.
         """
         match, within = self.correspondence, self.within[0].only_significant
-        multiple = (match.of_detection < 0) & (match.booked_on >= 0)
+        multiple = (match.of_detection < 0) & (match.assigned_to >= 0)
         holder = np.full(len(multiple), -1, dtype=np.int64)
-        holder[multiple] = match.of_reference[match.booked_on[multiple]]
+        holder[multiple] = match.of_reference[match.assigned_to[multiple]]
         duplicates = np.zeros(len(multiple), dtype=bool)
         for own, other in ((within.first, within.second), (within.second, within.first)):
             duplicates[own[holder[own] == other]] = True

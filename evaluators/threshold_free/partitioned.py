@@ -49,7 +49,7 @@ def require_exact(evaluator: ThresholdFree) -> None:
     """Raise `UnsupportedError` where areas are to be counted by pixels."""
     if evaluator.area == "pixels" or evaluator.gsd is not None:
         raise UnsupportedError(
-            "an evaluation in parts measures exact areas and no pixels: leave out area='pixels' and gsd="
+            "an evaluation in parts measures exact areas, not pixels: leave out area='pixels' and gsd="
         )
 
 
@@ -248,7 +248,7 @@ def _tallied(links: Links, united: UnionAreas) -> ThresholdFreeTallies:
         (graph.detected.areas, graph.reference.areas),
         match.pairs,
         graph.overlaps.area[graph.matched_overlaps],
-        false_positives=np.flatnonzero(graph.detections.mask & (match.booked_on < 0)),
+        false_positives=np.flatnonzero(graph.detections.mask & (match.assigned_to < 0)),
         false_negatives=np.flatnonzero(graph.references.mask & (match.of_reference < 0)),
         united=united,
     )

@@ -111,18 +111,18 @@ class _Claims:
     @classmethod
     def of(cls, graph: OverlapGraph) -> _Claims:
         match = graph.correspondence
-        multiple = graph.detections.mask & (match.of_detection < 0) & (match.booked_on >= 0)
+        multiple = graph.detections.mask & (match.of_detection < 0) & (match.assigned_to >= 0)
         found = (match.of_reference >= 0).astype(np.int32)
 
-        def booked(kind: NDArray[np.bool_]) -> NDArray[np.int32]:
-            return np.bincount(match.booked_on[multiple & kind], minlength=len(found)).astype(np.int32)
+        def counted_on(kind: NDArray[np.bool_]) -> NDArray[np.int32]:
+            return np.bincount(match.assigned_to[multiple & kind], minlength=len(found)).astype(np.int32)
 
-        return cls(found + booked(~graph.duplicates), found + booked(graph.duplicates), match)
+        return cls(found + counted_on(~graph.duplicates), found + counted_on(graph.duplicates), match)
 
     def home(self, detections: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the reference that each of some detections is matched with or booked on, or -1."""
+        """Return the reference that each of some detections is matched with or assigned to, or -1."""
         partner = self.match.of_detection[detections]
-        return np.where(partner >= 0, partner, self.match.booked_on[detections])
+        return np.where(partner >= 0, partner, self.match.assigned_to[detections])
 
 
 class Words:
@@ -250,6 +250,6 @@ class Words:
         return [
             f"merged with reference {other} into detection {name}, which covers {_share(share)} of it"
             if has
-            else f"missed: detection {name} overlaps it ({_share(share)}) but is booked on reference {other}"
+            else f"missed: detection {name} overlaps it ({_share(share)}) but is assigned to reference {other}"
             for name, other, has, share in zip(*(column.tolist() for column in columns), strict=True)
         ]

@@ -1,1 +1,1 @@
-"""How far an index of one comparison can be believed: intervals, redrawn references, and two detections paired."""
+"""Uncertainty of the indices of one comparison: intervals, redrawn references, and two detections paired."""

@@ -138,7 +138,9 @@ def block_intervals(
 def require_level(level: float) -> None:
     """Raise `ParameterError` unless the level is a percentage between 0 and 100."""
     if not 0 < level < 100:
-        raise ParameterError(f"interval={level:g} is no level in percent: use a number between 0 and 100, such as 95")
+        raise ParameterError(
+            f"interval={level:g} is not a level in percent: use a number between 0 and 100, such as 95"
+        )
 
 
 def block_tallies(

@@ -205,7 +205,7 @@ def redraw_differences(
 ) -> Redraws:
     """Return how far the differences between two detections move when the reference is redrawn; see `redraw_changes`.
 
-    Both are evaluated against the same redraws. A difference that is smaller than its change is not believed.
+    Both are evaluated against the same redraws. A difference that is smaller than its change is not reliable.
     """
     require_error(error)
     found: list[Mapping[str, float | None]] = []
@@ -226,7 +226,9 @@ def value_differences(one: Mapping[str, float | None], two: Mapping[str, float |
 def require_error(error: float) -> None:
     """Raise `ParameterError` unless the error is a length that a digitiser may be off by."""
     if not 0 <= error <= 100:
-        raise ParameterError(f"reference_error={error:g} is no digitising error: use metres from 0 to 100, such as 0.3")
+        raise ParameterError(
+            f"reference_error={error:g} is not a digitising error: use metres from 0 to 100, such as 0.3"
+        )
 
 
 def changes_of(given: Mapping[str, float | None], redrawn: list[Mapping[str, float | None]]) -> dict[str, float | None]:

@@ -46,7 +46,7 @@ def parse_crs(text: str) -> CRS:
     try:
         return pyproj.CRS.from_user_input(text)
     except ProjError as error:
-        raise CRSError(f"{text[:60]!r} is no coordinate reference system: write for instance EPSG:25832") from error
+        raise CRSError(f"{text[:60]!r} is not a coordinate reference system: write for instance EPSG:25832") from error
 
 
 def named_crs(text: str) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.wording import counted
 from .degrees import JSON_ENDINGS
 from .shapefile_parts import damaged_rows
 
@@ -49,9 +50,10 @@ def refuse_damaged(file: Path, layer: str, missing: NDArray[np.int64], count: in
     else:
         return
     if damaged:
+        many = counted(len(damaged), "outline is", "outlines are")
         raise InputError(
-            f"{file}: {len(damaged)} outlines are damaged (the first is feature {damaged[0]}): copy or download the "
-            "file again, or repair or delete them"
+            f"{file}: {many} damaged (the first is feature {damaged[0]}): copy or download the file again, or "
+            "repair or delete them"
         )
 
 

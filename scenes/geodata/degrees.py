@@ -18,7 +18,7 @@ __all__ = ["JSON_ENDINGS", "JSON_SYSTEMS", "json_means_degrees", "refuse_degrees
 
 #: Endings of GeoJSON, whole or a feature per line; without a CRS it is in degrees (RFC 7946).
 JSON_ENDINGS = (".geojson", ".json", ".geojsonl", ".geojsons", ".ndjson", ".jsonl")
-#: What GDAL takes a GeoJSON file to be in that names no CRS: without and with heights.
+#: What GDAL takes a GeoJSON file to be in that has no CRS: without and with heights.
 JSON_SYSTEMS = ("EPSG:4326", "EPSG:4979")
 #: Longest side of a footprint in degrees, some 500 m; no footprint in metres is so short.
 _LONGEST = 0.005
@@ -36,7 +36,7 @@ def refuse_degrees(geometries: NDArray[np.object_], where: str) -> None:
         x, y = np.median(bounds[:, :2], axis=0)
         raise CRSError(
             f"{where}: footprints at places such as ({x:.5g}, {y:.5g}) are {np.median(sizes):.1g} long, so the "
-            "coordinates are degrees and no metres, whatever CRS is named: transform them, for instance with "
+            "coordinates are degrees, not metres, whatever CRS is named: transform them, for instance with "
             "ogr2ogr -s_srs EPSG:4326 -t_srs and the projected system"
         )
 

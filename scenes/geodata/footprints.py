@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.display import Displayed
 from ...core.errors import InputError
 from ...core.registry import nearest_hint
+from ...core.wording import counted
 from .crs import crs_label, file_crs, named_crs
 from .polygon_repair import Repair, repaired
 from .ring_measures import centres_of, quadrilaterals_of
@@ -117,15 +118,15 @@ class Footprints(Displayed):
         for name, column in (attributes or {}).items():
             values = column if isinstance(column, np.ndarray) else np.asarray(column)  # keeps the mask of a masked one
             if len(values) != len(geometries):
-                raise InputError(
-                    f"{source}: attribute {name!r} has {len(values)} values for {len(geometries)} polygons"
-                )
+                numbers = f"{counted(len(values), 'value')} for {counted(len(geometries), 'polygon')}"
+                raise InputError(f"{source}: attribute {name!r} has {numbers}")
             columns[name] = values[kept]
         labels = None
         if building_ids is not None:
             given = building_ids if isinstance(building_ids, np.ndarray) else _as_column(building_ids)
             if given.shape != geometries.shape:
-                raise InputError(f"{source}: {given.size} building ids for {len(geometries)} polygons: give one each")
+                numbers = f"{counted(given.size, 'building id')} for {counted(len(geometries), 'polygon')}"
+                raise InputError(f"{source}: {numbers}: give one each")
             labels = labels_of(given)[kept]
         return cls(
             polygons=clean,

@@ -38,7 +38,7 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
         unknown = [name for name in bands if name not in (*BANDS, "-")]
         if unknown:
             raise InputError(
-                f"bands= has {unknown[0]!r}, which is no band name; use {', '.join(BANDS)}, and - to skip one"
+                f"bands= has {unknown[0]!r}, which is not a band name; use {', '.join(BANDS)}, and - to skip one"
             )
         further = header.alpha or header.mask_band
         if len(bands) != header.band_count and not (further and len(bands) == header.band_count + 1):
@@ -78,8 +78,8 @@ def assumed_bands(header: RasterHeader, bands: Sequence[str] | None) -> str | No
     texts = [text for text in header.band_names if text and not _NUMBER.fullmatch(text)]
     if texts:
         return (
-            f"{header.path.name} describes its bands as {', '.join(map(repr, texts))}, which name no colours: they "
-            f"were taken for {', '.join(names)}"
+            f"{header.path.name} describes its bands as {', '.join(map(repr, texts))}, which are not colour names: "
+            f"they were taken for {', '.join(names)}"
         )
     if _names_by_colour(header.colours) is None:
         return f"{header.path.name} does not name its bands: they were taken for {', '.join(names)}"

@@ -67,7 +67,7 @@ def read_labels(path: str | os.PathLike[str]) -> tuple[NDArray[np.object_], dict
         known &= np.isfinite(values)
         if (values[known] != np.round(values[known])).any():
             raise InputError(
-                f"{file} holds values that are no whole numbers: a label image has ids and a mask 0 and 1; apply a "
+                f"{file} holds values that are not whole numbers: a label image has ids and a mask 0 and 1; apply a "
                 "threshold to a map of probabilities first"
             )
     elif values.dtype.kind not in "iu":

@@ -79,7 +79,7 @@ def mosaic_image(
     bands: Sequence[str] | None = None,
     note: Callable[[str], None] | None = None,
 ) -> Image:
-    """Bring one or several orthoimages to `grid` in `crs`; a file that names no CRS is taken to be in it.
+    """Bring one or several orthoimages to `grid` in `crs`; a file that has no CRS is taken to be in it.
 
     Files whose cells coincide with those of `grid` are copied, others resampled: averaged when their cells are much
     smaller, else bilinear. A file of which nothing is used, since others cover it, is reported by `note`.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.wording import counted
 
 __all__ = ["damaged_rows", "refuse_broken_parts"]
 
@@ -37,22 +38,23 @@ def refuse_broken_parts(file: Path) -> None:
     index = _index(file)
     if index is None or not (len(index) or announced > _HEADER):
         return
-    counted = _counted(file)
-    if counted is not None and counted < len(index):
+    announced_rows = _announced_rows(file)
+    if announced_rows is not None and announced_rows < len(index):
         raise InputError(
-            f"{file}: its index (.shx) has {len(index)} rows and announces {counted}, so outlines would be missing: "
-            f"{_RESTORE}"
+            f"{file}: its index (.shx) has {counted(len(index), 'row')} and announces {announced_rows}, so outlines "
+            f"would be missing: {_RESTORE}"
         )
     end = int((index.sum(axis=1) + 4).max(initial=_HEADER // 2)) * 2
     if end < announced:
         raise InputError(
-            f"{file}: its index (.shx) of {len(index)} rows ends at byte {end} of {announced}, so outlines are "
-            f"missing from it: {_RESTORE}"
+            f"{file}: its index (.shx) of {counted(len(index), 'row')} ends at byte {end} of {announced}, so outlines "
+            f"are missing from it: {_RESTORE}"
         )
     rows = _table_rows(file)
     if rows is not None and rows != len(index):
+        numbers = f"{counted(rows, 'row')} for {counted(len(index), 'outline')}"
         raise InputError(
-            f"{file}: its table (.dbf) has {rows} rows for {len(index)} outlines, so they are not of one file: copy "
+            f"{file}: its table (.dbf) has {numbers}, so they are not of one file: copy "
             "it again with all its parts, or delete the .dbf to read outlines alone"
         )
 
@@ -92,7 +94,7 @@ def _index(file: Path) -> NDArray[np.int64] | None:
     return np.frombuffer(content, dtype=">i4").reshape(-1, 2).astype(np.int64)
 
 
-def _counted(file: Path) -> int | None:
+def _announced_rows(file: Path) -> int | None:
     """Return the number of rows that the header of the index announces; None where it cannot be a number of rows."""
     part = _part(file, ".shx")
     if part is None:

@@ -21,6 +21,7 @@ from ...core.inputs import require_file
 from ...core.output import whole_file
 from ...core.plain_paths import plain_path, plain_target
 from ...core.registry import nearest_hint
+from ...core.wording import counted
 from .crs import common_crs, crs_label, file_crs, is_geographic, named_crs, parse_crs, require_metric, same_crs
 from .damaged_outlines import refuse_damaged
 from .degrees import JSON_SYSTEMS, json_means_degrees, refuse_degrees
@@ -96,7 +97,7 @@ def read_footprints(
 
     Notes
     -----
-    A GeoJSON file that names no CRS is in degrees by RFC 7946. When its coordinates cannot be degrees, its CRS is
+    A GeoJSON file that has no CRS is in degrees by RFC 7946. When its coordinates cannot be degrees, its CRS is
     taken as not known.
 
     Raises
@@ -136,7 +137,7 @@ def read_footprints(
         footprints = dataclasses.replace(footprints, repairs=tuple(repairs))
     if len(geometries) and not len(footprints):
         kinds = sorted({repair.problem for repair in footprints.repairs})
-        raise InputError(f"{file}: no polygons among {len(geometries)} features ({'; '.join(kinds[:3])})")
+        raise InputError(f"{file}: no polygons among {counted(len(geometries), 'feature')} ({'; '.join(kinds[:3])})")
     return footprints
 
 

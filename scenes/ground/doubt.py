@@ -82,6 +82,5 @@ def doubt_note(doubtful: NDArray[np.bool_]) -> str | None:
     share = float(doubtful.mean()) if doubtful.size else 0.0
     if share < _SHARE:
         return None
-    return (
-        f"the filtered ground is unsure on {share:.1%} of the scene: far from any ground point, or raised within walls"
-    )
+    where = "far from any ground point, or raised within walls"
+    return f"the filtered ground is uncertain on {share:.1%} of the scene: {where}"

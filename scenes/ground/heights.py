@@ -119,15 +119,15 @@ def heights_of(
     if filtered is None:
         return Heights(
             Elevation(fill_unknown(ground) if known.any() else np.zeros_like(ground), grid),
-            (f"the DEM shows {_share(known)} of the scene, which has no points: the rest was interpolated",),
+            (f"the DEM covers {_share(known)} of the scene, which has no points: the rest was interpolated",),
         )
     if not known.any():
-        notes = "the DEM shows nothing of the scene: the ground was filtered from the points", *doubts
+        notes = "the DEM has no value in the scene: the ground was filtered from the points", *doubts
         return Heights(filtered, notes, doubtful)
     _fill_voids(ground, known, filtered, grid)
     return Heights(
         Elevation(ground, grid),
-        (f"the DEM shows {_share(known)} of the scene: the ground of the rest was filtered from the points",),
+        (f"the DEM covers {_share(known)} of the scene: the ground of the rest was filtered from the points",),
     )
 
 

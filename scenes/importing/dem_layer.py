@@ -40,8 +40,8 @@ def dem_of(place: Place, models: Sequence[RasterHeader], cell: float | None, poi
     if wild.any():
         value = float(dem.values[wild][0])
         raise InputError(
-            f"{file_paths(files)} holds heights of {value:g} m, where no land is: if that marks no data, say so with "
-            f"gdal_edit.py -a_nodata {value:g}"
+            f"{file_paths(files)} contains heights of {value:g} m, beyond those of land: if this value marks no "
+            f"data, declare it with gdal_edit.py -a_nodata {value:g}"
         )
     if unknown.all():
         raise InputError(

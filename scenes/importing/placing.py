@@ -77,14 +77,14 @@ def _decide_crs(given: str | None, clouds: Sequence[LasHeader], images: Sequence
     nameless = [cloud.path for cloud in clouds if cloud.crs is None]
     if nameless and given is None and named:
         raise CRSError(
-            f"{nameless[0]} names no CRS while {named[0].path} is in {crs_label(crs)}: if it is in the same, "
+            f"{nameless[0]} has no CRS while {named[0].path} is in {crs_label(crs)}: if it is in the same, "
             "say so by crs="
         )
     if crs is None:
         crs = next((image.crs for image in images if image.crs is not None), None) if not clouds else None
     if crs is None:
         first = nameless[0] if nameless else images[0].path
-        raise CRSError(f"{first} names no coordinate reference system: set it by crs=, for instance EPSG:25832")
+        raise CRSError(f"{first} has no coordinate reference system: set it by crs=, for instance EPSG:25832")
     if nameless:
         log.note(_assumed(nameless, crs))
     require_metric(crs, str(images[0].path) if images and not clouds else "the scene")
@@ -133,4 +133,4 @@ def _decide_extent(wanted: Extent | None, parts: list[tuple[str, Extent]], log: 
 
 def _assumed(nameless: Sequence[Path], crs: str) -> str:
     were = "was" if len(nameless) == 1 else "were"
-    return f"{file_names(nameless)} named no CRS and {were} taken to be in {crs_label(crs)}"
+    return f"{file_names(nameless)} had no CRS and {were} taken to be in {crs_label(crs)}"

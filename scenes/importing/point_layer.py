@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from ...core.errors import InputError
+from ...core.wording import counted
 from ..geodata.las_files import LasHeader, read_points
 from ..geodata.points import PointCloud
 from ..usable_points import is_land, is_noise
@@ -26,20 +25,23 @@ def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int
     if wild.any():
         value = float(cloud.z[wild][0])
         cloud = cloud.take(~wild)
-        place.log.note(
-            f"{np.count_nonzero(wild)} points at heights such as {value:g} m, where no land is, were left out"
-        )
+        dropped = counted(int(wild.sum()), "point was", "points were")
+        place.log.note(f"{dropped} left out: heights such as {value:g} m are beyond those of land")
         if len(cloud) == 0:
-            raise InputError(f"{names} holds no heights of land: the first is {value:g} m; are they scaled?")
+            raise InputError(
+                f"{names} contains no plausible heights: the first is {value:g} m; check the unit and the scale"
+            )
     noise = is_noise(cloud)
     if noise.any():
         cloud = cloud.take(~noise)
-        place.log.note(f"{np.count_nonzero(noise)} points of the classes noise (7 and 18) were left out")
+        dropped = counted(int(noise.sum()), "point was", "points were")
+        place.log.note(f"{dropped} left out: class 7 or 18 (noise)")
         if len(cloud) == 0:
-            raise InputError(f"{names} holds no points but noise (classes 7 and 18)")
+            raise InputError(f"{names} contains only noise (classes 7 and 18)")
     distinct = cloud.distinct()
     if len(distinct) < len(cloud):
-        place.log.note(f"{len(cloud) - len(distinct)} points that were there twice were left out")
+        repeated = counted(len(cloud) - len(distinct), "duplicate point was", "duplicate points were")
+        place.log.note(f"{repeated} left out")
     return distinct
 
 

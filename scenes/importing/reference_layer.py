@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from ...core.errors import InputError
+from ...core.wording import counted
 from ..geodata.footprints import Footprints
 from ..geodata.points import PointCloud
 from .place import Place, extent_text, file_paths
@@ -25,7 +26,7 @@ def read_reference(place: Place, name: str, building_id: str | None) -> Footprin
     if footprints.repairs:
         count = len(footprints.repairs)
         repairs = "; ".join(str(repair) for repair in footprints.repairs[:5]) + ("; ..." if count > 5 else "")
-        place.log.note(f"{file}: {count} footprint{'s were' if count > 1 else ' was'} repaired or left out ({repairs})")
+        place.log.note(f"{file}: {counted(count, 'footprint was', 'footprints were')} repaired or left out ({repairs})")
     if not len(footprints):
         place.log.note(f"{file} holds no footprints: the scene has an empty reference")
         return footprints
@@ -47,14 +48,15 @@ def reference_of_class(place: Place, points: PointCloud, files: Sequence[Path]) 
 
     reference = outlines_of_class(points, place.extent, crs=place.crs, source=file_paths(files))
     how = place.log.derived["reference"] = "traced around the points of class 6 (building)"
-    place.log.note(f"the reference ({len(reference)} footprints) was {how}")
+    place.log.note(f"the reference ({counted(len(reference), 'footprint')}) was {how}")
     return reference
 
 
 def blocks_of(place: Place, reference: Footprints, gap: float) -> Footprints:
     """Return the reference with footprints joined over gaps below `gap` (m)."""
     blocks = reference.joined(gap)
-    _changed_reference(place, f"joined over gaps below {gap:g} m ({len(reference)} footprints, {len(blocks)} blocks)")
+    numbers = f"{counted(len(reference), 'footprint')}, {counted(len(blocks), 'block')}"
+    _changed_reference(place, f"joined over gaps below {gap:g} m ({numbers})")
     return blocks
 
 
@@ -65,7 +67,7 @@ def rectangles_of(place: Place, reference: Footprints) -> Footprints:
     rectangles, fit = as_rectangles(reference)
     _changed_reference(
         place,
-        f"decomposed into rectangles ({fit.footprints} footprints, {fit.rectangles} rectangles, "
+        f"decomposed into rectangles ({counted(fit.footprints, 'footprint')}, {counted(fit.rectangles, 'rectangle')}, "
         f"areas agree to {fit.agreement:.1%})",
     )
     if fit.poor:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.wording import counted
 from ..geodata.points import PointCloud
 from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_elevation
@@ -42,19 +43,21 @@ def points_of_surface(place: Place, surfaces: Sequence[RasterHeader]) -> PointCl
     known = np.isfinite(heights)
     land = known & (heights >= LOWEST_LAND) & (heights <= HIGHEST_LAND)
     if not land.any():
-        what = f"no heights of land but such as {heights[known][0]:g} m" if known.any() else "no height"
+        what = f"no plausible heights, but values such as {heights[known][0]:g} m" if known.any() else "no height"
         raise InputError(f"{file_paths(files)} holds {what} in {extent_text(place.extent)}: give another surface model")
-    wild = np.count_nonzero(known & ~land)
+    wild = int(np.count_nonzero(known & ~land))
     if wild:
         value = float(heights[known & ~land][0])
-        place.log.note(f"{wild} cells with heights such as {value:g} m, where no land is, were left out")
+        dropped = counted(wild, "cell was", "cells were")
+        place.log.note(f"{dropped} left out: heights such as {value:g} m are beyond those of land")
     row, column = np.nonzero(land)
     x, y = grid.to_world(row + 0.5, column + 0.5)
     xmin, ymin, xmax, ymax = place.extent
     inside = (x >= xmin) & (x <= xmax) & (y >= ymin) & (y <= ymax)
     cloud = PointCloud(x=x[inside], y=y[inside], z=heights[row[inside], column[inside]].astype(np.float64))
     how = place.log.derived["points"] = f"taken from the cells of a surface model, one every {grid.gsd:g} m"
-    place.log.note(f"{file_names(files)}: {len(cloud)} points were {how}; {1 - land.mean():.1%} of the cells have none")
+    taken = counted(len(cloud), "point was", "points were")
+    place.log.note(f"{file_names(files)}: {taken} {how}; {1 - land.mean():.1%} of the cells have none")
     if grid.gsd > _COARSE:
         place.log.note(f"warning: cells of {grid.gsd:g} m are too large to show the walls of houses")
     return cloud

@@ -92,7 +92,7 @@ def test_words_name_scenes():
     assert (scene.name, scene.seed, scene.word) == ("hamlet-3", 3, "hamlet[seed=3]")
     (real,) = scenes_of(["delft"])
     assert (real.name, real.word, real.group, real.contents) == ("delft", "delft", "delft", real.open().contents)
-    with pytest.raises(RoofbenchError, match=r"'hamet' is no scene, preset or suite \(did you mean 'hamlet'"):
+    with pytest.raises(RoofbenchError, match=r"'hamet' is not a scene, preset or suite \(did you mean 'hamlet'"):
         scenes_of(["hamet"])
 
 

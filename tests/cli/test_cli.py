@@ -32,7 +32,7 @@ def cli(tmp_path, monkeypatch):
 def test_run_prints_a_leaderboard_and_writes_files(cli, misbehaving, tmp_path):
     result = cli("run", "hamlet[seed=1]", "-d", misbehaving, "-j", 0, "-o", "out")
     assert "misbehaving" in result.stdout
-    assert "1 runs done" in result.stderr
+    assert "1 run done" in result.stderr
     assert (tmp_path / "out" / "leaderboard.csv").read_text().count("\n") == 3
     assert "| rank" in (tmp_path / "out" / "leaderboard.md").read_text().replace("|   rank", "| rank")
     again = cli("run", "hamlet[seed=1]", "-d", misbehaving, "-j", 0)
@@ -45,6 +45,26 @@ def test_a_failing_detector_is_exit_code_3_with_reason_and_command(cli, misbehav
     assert "failed misbehaving[mode=leaves] on hamlet-1, seed 0: the worker process exited" in result.stderr
     assert "repeat: roofbench detect" in result.stderr
     assert "misbehaving" in result.stdout
+
+
+def test_the_next_command_repeats_what_failed_or_continues_with_the_own_detector(cli, misbehaving, tmp_path):
+    def following(*words, code=0):
+        return cli("run", "hamlet", "-j", 0, *words, code=code).stderr.splitlines()[-1]
+
+    assert following("-d", f"{misbehaving}[mode=raises]", code=3) == "next: roofbench run --resume --retry-failed"
+    assert following("-d", misbehaving) == f"next: roofbench baseline save -d {misbehaving} -o baseline.json"
+    assert following("-d", "ndsm") == "next: roofbench new detector my-detector"
+    broken = tmp_path / "broken.py"
+    broken.write_text(
+        "import roofbench as rb\n"
+        "from roofbench.evaluators.iou import IoU\n"
+        "class Broken(IoU):\n"
+        "    name = 'broken'\n"
+        "    def measured(self, sets):\n"
+        "        raise ValueError('no tally today')\n"
+    )
+    words = ("-d", "ndsm", "-e", f"{broken}:Broken", "--store", "other.sqlite")
+    assert following(*words, code=3) == "next: roofbench run --resume --store other.sqlite"
 
 
 def test_nothing_measured_is_exit_code_4(cli, misbehaving, tmp_path):
@@ -119,7 +139,7 @@ def test_detect_writes_what_a_run_stores(cli, misbehaving):
     ("words", "message"),
     [
         (("run", "nosuch.toml"), "nosuch.toml: no such file"),
-        (("run", "nosuch"), "is no scene, preset or suite"),
+        (("run", "nosuch"), "is not a scene, preset or suite"),
         (("run", "quik"), "did you mean 'quick'"),
         (("run", "villag"), "did you mean 'village'"),
         (("detect", "ndsm", "fairfeild", "-o", "x.gpkg"), "did you mean 'fairfield'"),
@@ -326,7 +346,7 @@ def test_run_writes_a_report_beside_the_store_and_names_its_files(cli, misbehavi
 def test_a_report_replaces_reports_only(cli, misbehaving, tmp_path):
     (tmp_path / "report.html").write_text("<p>of somebody</p>")
     answer = cli("run", "hamlet", "-d", misbehaving, "-j", 0)
-    assert "report.html is no report of roofbench and was not replaced" in answer.stderr
+    assert "report.html is not a report of roofbench and was not replaced" in answer.stderr
     assert (tmp_path / "report.html").read_text() == "<p>of somebody</p>"
     (tmp_path / "report.html").unlink()
     cli("run", "hamlet", "-d", misbehaving, "-j", 0, "--no-report")

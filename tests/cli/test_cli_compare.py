@@ -39,7 +39,7 @@ def test_a_redrawn_reference_moves_the_differences(files):
     words = ("compare", "a.geojson", "b.gpkg", "r.gpkg", "--reference-error", "0.5")
     table = roofbench(*words, folder=files).stdout
     assert "redrawn ±0.5 m" in table
-    assert "a smaller difference is not believed" in table
+    assert "a smaller difference is not reliable" in table
     redrawn = json.loads(roofbench(*words, "-f", "json", folder=files).stdout)["reference_error"]
     assert (redrawn["error"], redrawn["redraws"]) == (0.5, 50)
     assert redrawn["changes"]["object.completeness"] == 0, "every house still overlaps its reference"
@@ -94,7 +94,7 @@ def test_another_evaluator_compares_too(files):
     [
         (("a.geojson", "none.gpkg", "r.gpkg"), "none.gpkg"),
         (("a.geojson", "b.gpkg", "r.gpkg", "-e", "all"), "one evaluator at a time: name it by --evaluator"),
-        (("a.geojson", "b.gpkg", "r.gpkg", "--interval", "100"), "--interval 100 is no level in percent"),
+        (("a.geojson", "b.gpkg", "r.gpkg", "--interval", "100"), "--interval 100 is not a level in percent"),
         (("a.geojson", "b.gpkg", "r.gpkg", "--plot", "b.gpkg"), "set --overwrite"),
         (("a.geojson", "b.gpkg", "r.gpkg", "--plot", "map.bmp"), "unknown file ending"),
     ],

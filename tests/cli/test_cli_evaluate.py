@@ -310,8 +310,8 @@ def test_intervals_and_a_redrawn_reference_stand_beside_the_values(files):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--interval", "0"), "--interval 0 is no level in percent"),
-        (("--reference-error", "-1"), "--reference-error -1 is no digitising error"),
+        (("--interval", "0"), "--interval 0 is not a level in percent"),
+        (("--reference-error", "-1"), "--reference-error -1 is not a digitising error"),
         (("--redraws", "5"), "--redraws needs --reference-error"),
     ],
 )

@@ -3,6 +3,7 @@
 import copy
 import inspect
 import pickle
+import pydoc
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
@@ -52,6 +53,14 @@ def test_a_derived_class_has_the_fields_of_its_base_and_its_own():
     assert Threshold().values() == {"height": 2.5}
     assert Finer().values() == {"height": 2.5, "cell": 0.5}
     assert Finer(threads=3).execution_values() == {"threads": 3}
+
+
+def test_help_shows_the_parameters_of_a_class():
+    for documented in (Threshold, Threshold()):
+        shown = pydoc.plain(pydoc.render_doc(documented))
+        assert "Parameters\n |  ----------\n |  " in shown
+        assert "default" in shown
+    assert "Parameters" not in Threshold.description()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,7 +64,7 @@ def test_all_forms_hold_all_runs_whatever_the_size_of_the_pieces(tmp_path):
 @pytest.mark.usefixtures("_at_once")
 def test_an_empty_choice_is_still_a_table_and_a_list(tmp_path):
     path = fill(tmp_path / "runs.sqlite", ["one"])
-    assert text_of(path, "table", detector="x*").splitlines()[-1] == f"0 of 1 runs in {path}"
+    assert text_of(path, "table", detector="x*").splitlines()[-1] == f"0 of 1 run in {path}"
     assert text_of(path, "csv", detector="x*").startswith("id,key,status,label,")
     assert json.loads(text_of(path, "json", detector="x*")) == []
 

@@ -173,7 +173,7 @@ def test_a_store_compared_with_itself_is_the_same(folder):
 def test_stores_without_common_scenes_are_not_comparable(folder):
     rb.run(scenes=["hamlet[seed=3]"], detectors=["ndsm"], store=folder / "other.sqlite")
     answer = roofbench("report", "runs.sqlite", "--against", "other.sqlite", folder=folder, expect=4)
-    assert "only in B: 1 pairs" in answer.stdout
+    assert "only in B: 1 pair of" in answer.stdout
 
 
 def test_plots_are_written(folder):

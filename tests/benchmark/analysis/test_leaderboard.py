@@ -247,6 +247,6 @@ def test_many_different_notes_are_counted():
     runs = Runs()
     for scene in range(1, 9):
         runs.add("one", scene, 9)
-        runs.notes[scene] = (f"the DEM shows {scene} % of the scene",)
-    assert runs.board().notes[-2] == "hamlet-5: the DEM shows 5 % of the scene"
+        runs.notes[scene] = (f"the DEM covers {scene} % of the scene",)
+    assert runs.board().notes[-2] == "hamlet-5: the DEM covers 5 % of the scene"
     assert runs.board().notes[-1] == "3 further estimates; 'roofbench why RUN' shows those of a run"

@@ -237,7 +237,7 @@ def test_a_bad_file_costs_its_tiles_alone_and_a_repaired_one_is_computed_then(co
     if indexed and spoil is not broken:
         code, _, message = run("detect", "ndsm[cell=0.5]", folder, "-o", tmp_path / "whole.fgb")
         assert code == 3
-        assert "1 file is no part of the scene" in message
+        assert "1 file is not part of the scene" in message
     (folder / "2.laz").write_bytes(content)
     assert run("scenes", "index", folder)[0] == 0
     code, _, message = run(*words, "--overwrite")

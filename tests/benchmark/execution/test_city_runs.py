@@ -177,7 +177,7 @@ def test_a_file_of_another_zone_fails_the_run_and_is_named(tmp_path):
     for words in (tiled, untiled):
         code, _, message = run(*words)
         assert code == 3
-        assert "one file is no part of the scene: 1.laz is left out" in message
+        assert "1 file is not part of the scene, first 1.laz is left out" in message
     kept = finished(tmp_path / "a.sqlite")
     assert kept
     (folder / "1.laz").write_bytes(content)

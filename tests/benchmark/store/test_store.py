@@ -165,7 +165,7 @@ def test_runs_are_found_by_number_key_and_pattern(store, outcome):
 
 def test_a_file_that_is_no_store_or_a_newer_one_is_refused(tmp_path):
     (tmp_path / "text.sqlite").write_text("no database at all, but long enough to be taken for one" * 30)
-    with pytest.raises(RoofbenchError, match="is no results store"):
+    with pytest.raises(RoofbenchError, match="is not a results store"):
         Store(tmp_path / "text.sqlite")
     other = sqlite3.connect(tmp_path / "other.sqlite")
     other.execute("CREATE TABLE things (id)")

@@ -87,7 +87,7 @@ CASES = {
     "broken": ('echo \'{"type": "Feature\' > $3', r"wrote what cannot be used: footprints.geojson cannot be read"),
     "no polygons": (
         'echo \'{"type":"Point","coordinates":[1000000,1]}\' > $3',
-        r"no polygons among 1 features",
+        r"no polygons among 1 feature",
     ),
     "gigabyte": ("head -c 1000000000 /dev/zero > $3", r"footprints.geojson is larger than 5 MB"),
     "talks": ("yes | head -c 100000000", r"log.txt is larger than 5 MB"),

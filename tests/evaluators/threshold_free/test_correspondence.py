@@ -33,7 +33,7 @@ def test_a_chain_by_hand():
     found = matched(pairs, distances, (2, 2))
     assert found.of_detection.tolist() == [-1, 0]
     assert found.of_reference.tolist() == [1, -1]
-    assert found.booked_on.tolist() == [0, 0]
+    assert found.assigned_to.tolist() == [0, 0]
     assert [rows.tolist() for rows in found.pairs] == [[1], [0]]
     by_area = matched(pairs, distances, (2, 2), "overlap")
     assert by_area.of_detection.tolist() == [0, 1]
@@ -63,7 +63,7 @@ def test_distances_that_differ_by_less_than_a_micrometre_are_ties():
 def test_without_overlaps_no_object_has_a_partner(matching):
     found = matched([], {}, (2, 3), matching)
     assert (found.of_detection.tolist(), found.of_reference.tolist()) == ([-1, -1], [-1, -1, -1])
-    assert found.booked_on.tolist() == [-1, -1]
+    assert found.assigned_to.tolist() == [-1, -1]
 
 
 @given(st.data(), st.sampled_from(MATCHINGS))
@@ -89,6 +89,6 @@ def test_partners_are_mutual_overlap_and_are_the_same_as_by_a_plain_loop(data, m
         if d not in partner and r not in partner.values():
             partner[d] = r
     assert found.of_detection.tolist() == [partner.get(d, -1) for d in range(counts[0])]
-    assert found.booked_on.tolist() == [nearest.get(d, -1) for d in range(counts[0])]
+    assert found.assigned_to.tolist() == [nearest.get(d, -1) for d in range(counts[0])]
     for d, r in enumerate(found.of_detection.tolist()):
         assert r < 0 or found.of_reference[r] == d

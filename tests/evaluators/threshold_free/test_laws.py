@@ -46,7 +46,7 @@ def assert_same_values(one, two, *, rel=1e-7):
 
 @laws
 @given(seeds, st.sampled_from(["nearest", "one-pass", "overlap"]))
-def test_every_object_is_booked_exactly_once(seed, matching):
+def test_every_object_is_counted_exactly_once(seed, matching):
     detected, reference, building = scene(seed)
     counts = evaluate(detected, reference, building, matching=matching).counts
     assert counts.true_positives + counts.false_positives + counts.multiple_detections == len(detected)

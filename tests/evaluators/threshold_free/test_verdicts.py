@@ -124,7 +124,7 @@ def test_one_pass_matching_leaves_a_reference_that_sweeping_finds():
     assert swept.counts.true_positives == 2
     assert literal.counts.true_positives == 1
     assert literal.verdicts.references.loc[1, "reason"] == (
-        "missed: detection 1 overlaps it (25 %) but is booked on reference 0"
+        "missed: detection 1 overlaps it (25 %) but is assigned to reference 0"
     )
 
 

@@ -43,8 +43,8 @@ def test_metres_pass(text):
         ("EPSG:4326", "here: EPSG:4326 is geographic"),
         ("EPSG:2263", "here: EPSG:2263 is in US survey foot"),
         ("EPSG:25832+6360", "here: its heights are in US survey foot"),
-        ("EPSG:1", "is no coordinate reference system"),
-        ("nonsense", "is no coordinate reference system"),
+        ("EPSG:1", "is not a coordinate reference system"),
+        ("nonsense", "is not a coordinate reference system"),
     ],
 )
 def test_anything_else_is_refused(text, message):

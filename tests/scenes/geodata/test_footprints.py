@@ -98,7 +98,7 @@ def test_without_building_ids_each_is_its_own_building():
         (lambda: rb.Footprints.of(["POLYGON ((0 0, 1 0, 1 1, 0 0))"]), "shapely polygons, not str"),
         (lambda: rb.Footprints.of(box(0, 0, 1, 1)), "put a single one in a list"),
         (lambda: rb.Footprints.of(np.array([[box(0, 0, 1, 1)]])), "one dimension"),
-        (lambda: rb.Footprints.of([box(0, 0, 1, 1)], building_ids=[1, 2]), "2 building ids for 1 polygons"),
+        (lambda: rb.Footprints.of([box(0, 0, 1, 1)], building_ids=[1, 2]), "2 building ids for 1 polygon"),
         (lambda: rb.Footprints.of([box(0, 0, 1, 1)], attributes={"a": []}), "attribute 'a' has 0 values for 1"),
     ],
 )

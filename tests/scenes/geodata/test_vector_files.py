@@ -318,7 +318,7 @@ def test_a_folder_is_no_file(tmp_path):
 
 
 def test_a_layer_without_polygons_is_refused(geojson):
-    with pytest.raises(InputError, match="no polygons among 1 features"):
+    with pytest.raises(InputError, match="no polygons among 1 feature"):
         rb.read_footprints(geojson(({"type": "Point", "coordinates": [1, 2]}, {})))
 
 
@@ -357,7 +357,7 @@ def test_a_file_that_cannot_be_written_is_reported(tmp_path, name, message):
 
 
 def test_an_unknown_crs_is_refused_before_writing(tmp_path):
-    with pytest.raises(CRSError, match="'EPSG:999999' is no coordinate reference system"):
+    with pytest.raises(CRSError, match="'EPSG:999999' is not a coordinate reference system"):
         rb.write_footprints(rb.Footprints.of(SQUARES, crs="EPSG:999999"), tmp_path / "out.gpkg")
 
 

@@ -112,10 +112,10 @@ def in_degrees(count=5, west=8.4, south=49.0):
 @pytest.mark.parametrize(
     ("written", "crs", "message"),
     [
-        ({}, "EPSG:25832", "are degrees and no metres"),
+        ({}, "EPSG:25832", "are degrees, not metres"),
         ({"crs": None}, None, "is geographic"),
         ({"meta": {"crs": None}}, None, "is geographic"),
-        ({"crs": {"type": "name", "properties": {"name": "EPSG:25832"}}}, None, "are degrees and no metres"),
+        ({"crs": {"type": "name", "properties": {"name": "EPSG:25832"}}}, None, "are degrees, not metres"),
     ],
     ids=["metres given", "none", "none of another member", "metres named"],
 )
@@ -137,9 +137,9 @@ def test_a_member_that_says_no_crs_counts_wherever_it_stands(tmp_path):
 
 def test_degrees_in_other_formats_are_refused(tmp_path):
     write_footprints(Footprints.of(in_degrees(), crs="EPSG:25832"), tmp_path / "a.gpkg")
-    with pytest.raises(CRSError, match="are degrees and no metres"):
+    with pytest.raises(CRSError, match="are degrees, not metres"):
         read_footprints(tmp_path / "a.gpkg")
-    with pytest.raises(CRSError, match="are degrees and no metres"):
+    with pytest.raises(CRSError, match="are degrees, not metres"):
         open_stream(tmp_path / "a.gpkg")
 
 
@@ -148,8 +148,8 @@ def test_degrees_in_other_formats_are_refused(tmp_path):
     [
         (".dbf", 4, struct.pack("<I", 2), r"table \(.dbf\) has 2 rows for 3 outlines"),
         (".shx", 116, None, r"index \(.shx\) of 2 rows ends at byte 372 of 508"),
-        (".shx", 108, struct.pack(">I", 7), "1 outlines are damaged .* feature 1"),
-        (".shp", 280, struct.pack("<I", 999), "1 outlines are damaged .* feature 1"),
+        (".shx", 108, struct.pack(">I", 7), "1 outline is damaged .* feature 1"),
+        (".shp", 280, struct.pack("<I", 999), "1 outline is damaged .* feature 1"),
     ],
     ids=["rows of the table", "rows of the index", "place", "number of points"],
 )
@@ -295,7 +295,7 @@ def geopackage_with(path, row, change):
 )
 def test_an_outline_of_a_geopackage_that_is_damaged_is_not_left_out(tmp_path, change):
     path = geopackage_with(tmp_path / "cut.gpkg", 4, change)
-    with pytest.raises(InputError, match=r"1 outlines are damaged \(the first is feature 3\)"):
+    with pytest.raises(InputError, match=r"1 outline is damaged \(the first is feature 3\)"):
         read_footprints(path)
     with pytest.raises(InputError, match=r"(1 outlines are|feature 3 is) damaged"):
         list(open_stream(path).outlines())
@@ -313,7 +313,7 @@ def test_an_outline_of_json_that_is_damaged_is_not_left_out(tmp_path, coordinate
     whole = collection(SQUARES)
     whole["features"][1]["geometry"]["coordinates"] = coordinates
     path.write_text(json.dumps(whole))
-    with pytest.raises(InputError, match=r"1 outlines are damaged \(the first is feature 1\)"):
+    with pytest.raises(InputError, match=r"1 outline is damaged \(the first is feature 1\)"):
         read_footprints(path, crs="EPSG:25832")
 
 

@@ -41,7 +41,7 @@ def test_a_scene_without_a_dem_notes_the_doubtful_share_and_keeps_the_map():
     hall = (abs(x - 120) < 100) & (abs(y - 120) < 55)
     points = PointCloud(x.ravel(), y.ravel(), np.where(hall, 12.0, 0.0).ravel())
     heights = heights_of(points, None, (0, 0, 240, 240))
-    assert "the filtered ground is unsure on" in heights.notes[1]
+    assert "the filtered ground is uncertain on" in heights.notes[1]
     assert heights.doubtful.sample(np.array([120.0, 5.0]), np.array([120.0, 5.0])).tolist() == [1, 0]
     plain = heights_of(points.take(~hall.ravel()), None, (0, 0, 240, 240))
     assert len(plain.notes) == 1
@@ -51,4 +51,4 @@ def test_a_scene_without_a_dem_notes_the_doubtful_share_and_keeps_the_map():
 def test_next_to_nothing_is_no_note():
     assert doubt_note(np.zeros((10, 10), dtype=bool)) is None
     assert doubt_note(np.zeros((0, 0), dtype=bool)) is None
-    assert doubt_note(ALL).startswith("the filtered ground is unsure on 100.0% of the scene")
+    assert doubt_note(ALL).startswith("the filtered ground is uncertain on 100.0% of the scene")
