@@ -1,0 +1,161 @@
+"""The page docs/results/leaderboard.md from the store of `study_leaderboard`: a table of each matching.
+
+Run by hand: ``python tests/performance/study_leaderboard_page.py board/roofbench.sqlite REVISION > leaderboard.md``.
+Stored detections are evaluated here, so that no detector runs. Runs of other code than the installed one are left out;
+REVISION is that of the installed code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import statistics
+from collections import defaultdict
+from pathlib import Path
+
+import roofbench as rb
+from roofbench.benchmark.analysis.published import PUBLISHED
+from roofbench.benchmark.identity.keys import source_closure
+from roofbench.benchmark.store.writer import Store
+from roofbench.detectors.registry import DETECTORS as DETECTORS_BY_NAME
+
+AREAS = {
+    "Fairfield": ("fairfield",),
+    "Fairfield 1-3": ("fairfield-1", "fairfield-2", "fairfield-3"),
+    "Moonee Ponds": ("moonee-ponds",),
+    "Knox": ("knox",),
+    "Toronto": ("toronto-a", "toronto-b"),
+    "Vaihingen": ("vaihingen-a", "vaihingen-b"),
+}
+REAL = (
+    *("delft", "delft-houses", "delft-blocks", "kentucky", "french-village"),
+    *("ign", "bratislava", "st-barth"),
+)
+MATCHINGS = {
+    "nearest": "every object goes to the nearest centre (the default)",
+    "one-pass": "one pass in file order, as the papers' text can be read",
+    "overlap": "the largest overlap decides",
+}
+DETECTORS = (
+    *("original", "original[mode=paper]", "original[mode=program]"),
+    *("improved", "improved[mode=paper]", "improved[mode=program]"),
+    *("mpp", "mpp[level=part]", "mpp-printed", "dempster-shafer", "ndsm"),
+    *("command:whitebox", "command:cloth-filter", "command:grass"),
+)
+QUALITY = ("object.quality", "pixel.quality")
+
+
+def newest(store):
+    """Return the last run of every label, scene and seed, of those by the code that is installed."""
+    rows = sorted((row for row in store.runs() if row.label in DETECTORS), key=lambda row: row.id)
+    digests = {name: source_closure(DETECTORS_BY_NAME.get(name)).digest for name in {row.detector for row in rows}}
+    current = [row for row in rows if store.code(row.id).digest == digests[row.detector]]
+    return list({(row.label, row.scene, row.seed): row for row in current}.values())
+
+
+def column_of(row):
+    """Return the column of a run: an area of the papers, or a real scene."""
+    recipe = row.recipe
+    if recipe.kind == "preset":
+        return next((area for area, presets in AREAS.items() if recipe.place in presets), None)
+    return row.scene if row.scene in REAL else None
+
+
+def qualities(store, rows, matching):
+    """Return object and pixel quality of every good run, percent, by label and column."""
+    evaluator = rb.make_evaluator("threshold-free", matching=matching)
+    found = defaultdict(lambda: defaultdict(list))
+    scenes = {}
+    for row in rows:
+        column = column_of(row)
+        if row.status != "ok" or column is None:
+            continue
+        scene = scenes.setdefault(row.scene_id, store.scene(row.scene_id))
+        values = evaluator.evaluate(store.detections(row.id), scene.reference, area=scene.area, grid=scene.grid).values
+        found[row.label][column].append(tuple(values[name] for name in QUALITY))
+    return found
+
+
+def cell(values):
+    """Return the means of a list of pairs, percent; an object quality without any object is left out."""
+    means = []
+    for column in zip(*values, strict=True):
+        known = [value for value in column if value is not None]
+        means.append(f"{100 * statistics.fmean(known):.1f}" if known else "-")
+    return " / ".join(means)
+
+
+def table(found, states, columns, *, published):
+    """Return the lines of a table: a row for each detector, and beneath it what its paper prints."""
+    lines = ["| detector | " + " | ".join(columns) + " |", "|---|" + "--:|" * len(columns)]
+    for label in DETECTORS:
+        cells = [cell(found[label][name]) if found[label][name] else states.get((label, name), "") for name in columns]
+        lines.append(f"| `{label}` | " + " | ".join(cells) + " |")
+    for detector in dict.fromkeys(row.detector for row in PUBLISHED) if published else ():
+        cells = [printed(detector, AREAS[name]) for name in columns]
+        lines.append(f"| *printed for `{detector}`* | " + " | ".join(cells) + " |")
+    return lines
+
+
+def printed(detector, presets):
+    """Return the mean of what a paper prints of its scenes of an area."""
+    rows = [row for row in PUBLISHED if row.detector == detector and not row.average and set(row.presets) <= {*presets}]
+    texts = [[row.printed[symbol] for row in rows if symbol in row.printed] for symbol in ("Q_l", "Q_lp")]
+    means = [f"*{statistics.fmean(map(float, values)):.1f}*" if values else "-" for values in texts]
+    return " / ".join(means) if rows else ""
+
+
+def without_result(rows):
+    """Return what stands in place of a figure by label and column, and the sentences of failures and skips."""
+    states, sentences = {}, defaultdict(list)
+    for row in rows:
+        if row.status != "ok" and (column := column_of(row)):
+            states[row.label, column] = row.status
+            reason = row.reason.replace(f"scene {row.scene!r} ", "the scene ")
+            sentences[row.status, row.label, reason].append(row.scene)
+    lines = []
+    for (status, label, reason), scenes in sorted(sentences.items()):
+        if label in DETECTORS:
+            lines.append(f"- {status}: `{label}` on {', '.join(sorted(scenes))}: {reason}.")
+    return states, lines
+
+
+def page(file, revision):
+    """Return the page."""
+    with Store(file) as store:
+        rows = newest(store)
+        states, sentences = without_result(rows)
+        by_matching = {matching: qualities(store, rows, matching) for matching in MATCHINGS}
+    day = max(datetime.date.fromisoformat(row.finished[:10]) for row in rows)
+    good = sum(row.status == "ok" for row in rows)
+    lines = [
+        "# One leaderboard",
+        "",
+        "Every detector on the scenes of the suite `papers` (three seeds of each preset) and on eight real scenes:",
+        "object quality / pixel quality, percent, means over the scenes of a column. Printed figures are of other",
+        "data, the real places that the presets follow, so they allow a comparison and no more.",
+        "",
+        f"Measured {day} at revision {revision}, {len(rows)} runs, {good} with a result. The command",
+        "`python tests/performance/study_leaderboard.py FOLDER -o board` runs it; the folder holds the real scenes.",
+        "`tests/performance/study_leaderboard_page.py` writes this page.",
+    ]
+    for matching, meaning in MATCHINGS.items():
+        found = by_matching[matching]
+        lines += ["", f"## Matching `{matching}`: {meaning}", "", "Suite `papers`:", ""]
+        lines += table(found, states, list(AREAS), published=True)
+        lines += ["", "Real scenes:", ""]
+        lines += table(found, states, list(REAL), published=False)
+    lines += ["", "## Failures and skips", "", *(sentences or ["None."])]
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("store", type=Path)
+    parser.add_argument("revision")
+    options = parser.parse_args()
+    print(page(options.store, options.revision), end="")
+
+
+if __name__ == "__main__":
+    main()
