@@ -52,7 +52,9 @@ def opened(file: Path, *, alpha: bool | None = None) -> Iterator[Any]:
     except (RasterioError, RasterioIOError) as error:  # two kinds before rasterio 1.4
         cause = error.__cause__ or error
         reason = " ".join(str(cause).split())
-        raise InputError(f"{file} cannot be read as an image ({reason}): give a GeoTIFF") from error
+        raise InputError(
+            f"{file} cannot be read as a raster ({reason}): copy or download it again, or give a GeoTIFF"
+        ) from error
 
 
 @contextmanager

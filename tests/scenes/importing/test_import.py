@@ -550,13 +550,13 @@ def test_an_image_of_floating_point_numbers(files, refused):
 
 def test_an_image_that_is_no_image(files, refused):
     (files / "text.tif").write_text("no image")
-    assert "text.tif cannot be read as an image" in refused("points.laz", "text.tif")
+    assert "text.tif cannot be read as a raster" in refused("points.laz", "text.tif")
 
 
 def test_a_truncated_image(files, refused):
     content = (files / "ortho.tif").read_bytes()
     (files / "cut.tif").write_bytes(content[: len(content) // 2])
-    assert "cut.tif cannot be read as an image" in refused("points.laz", "cut.tif")
+    assert "cut.tif cannot be read as a raster" in refused("points.laz", "cut.tif")
 
 
 def test_a_dem_without_heights(files, refused):
