@@ -93,8 +93,9 @@ def index_folder(
     known = read_chunk_index(home)
     for number, file in enumerate(files, start=1):
         try:
-            tiles.append(_tile(home, file, crs))
-            _add_chunks(file, tiles[-1].entry, known, chunks)
+            tile = _tile(home, file, crs)
+            _add_chunks(file, tile.entry, known, chunks)
+            tiles.append(tile)
         except (RoofbenchError, OSError) as error:
             problems.append(f"{file.relative_to(home)} is left out: {error}")
         if progress is not None:

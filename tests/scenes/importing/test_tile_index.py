@@ -90,6 +90,18 @@ def test_files_that_cannot_be_used_are_named_and_the_others_are_indexed(tiles):
     assert tomllib.loads((tiles / "scene.toml").read_text())["left_out"] == list(found.problems)
 
 
+def test_a_large_file_with_broken_chunks_is_no_part_of_the_scene(tiles, monkeypatch):
+    monkeypatch.setattr(tile_index, "_LARGE", 1)
+    broken = sorted(tiles.rglob("*.laz"))[0]
+    content = broken.read_bytes()
+    broken.write_bytes(content[:2000] + bytes(len(content) - 2200) + content[-200:])
+    indexed = index_folder(tiles)
+    assert broken.name in indexed.problems[0]
+    assert not [entry for entry in indexed.scene.left_out if broken.name not in entry]
+    listed = (tiles / "scene.toml").read_text()
+    assert f'file = "{broken.relative_to(tiles).as_posix()}"' not in listed
+
+
 def test_points_of_noise_are_left_out(tmp_path):
     points = cloud()
     points.classification[:10] = 7
