@@ -42,6 +42,8 @@ __all__ = ["Improved"]
 _ENTROPY_PIXEL = 0.25
 #: Least area per pixel of edge in test 6, pixels.
 _EDGE_PIXELS = 45.0
+#: Smallest divisor of the vegetation index, of 255.
+_LEAST_LIMIT = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -300,7 +302,8 @@ class Improved(LineDetector):
         return score_candidates(
             directions(gradients, around),
             rasters.scale.scaled(mean_in_boxes(rasters.cover.entropy, candidates)),
-            mean_in_boxes(rasters.cover.vegetation, candidates) / self._index_limit(rasters.image),
+            # A threshold of 0 makes everything vegetation.
+            mean_in_boxes(rasters.cover.vegetation, candidates) / max(self._index_limit(rasters.image), _LEAST_LIMIT),
             mean_roughness(rasters.roughness, candidates),
             lengths(candidates) * widths(candidates) * rasters.gsd**2,
         )

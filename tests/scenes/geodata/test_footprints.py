@@ -163,3 +163,15 @@ def test_rings_of_what_clipping_leaves_empty_have_no_points():
     start, points = rb.Footprints(clipped).rings
     assert start.tolist() == [0, 5, 5, 5, 10]
     assert np.isfinite(points).all()
+
+
+@pytest.mark.parametrize(("offset", "blocks"), [(0.0, 1), (0.3, 1), (0.35, 1), (0.4, 2), (1.0, 2)])
+def test_neighbours_at_a_corner_are_joined_as_neighbours_at_a_side_are(offset, blocks):
+    far = 10 + offset
+    pair = rb.Footprints.of([shapely.box(0, 0, 10, 10), shapely.box(far, far, far + 10, far + 10)])
+    found = pair.joined(0.5)
+    assert len(found) == blocks
+    assert found.areas.sum() == pytest.approx(200, abs=0.02)
+    row = rb.Footprints.of([*pair.polygons, shapely.box(-10.2, 0, -0.2, 10), shapely.box(40, 0, 50, 10)]).joined(0.5)
+    assert len(row) == blocks + 1
+    assert all(one.geom_type == "Polygon" and one.is_valid for one in row.polygons)
