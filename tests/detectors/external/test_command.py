@@ -123,12 +123,25 @@ def test_another_crs_is_refused(program, tmp_path):
         rb.detect(scene, program(f"cp {file} $3"))
 
 
-def test_heights_are_dropped_with_a_note_and_invalid_polygons_repaired(program, scene, tmp_path):
+def test_polygons_with_heights_are_refused(program, scene, tmp_path):
     file = tmp_path / "z.geojson"
     file.write_text(collection(scene, z=",12.5"))
-    found = rb.detect(scene, program(f"cp {file} $3"))
-    assert found.areas == pytest.approx([100.0])
-    assert found.metadata["notes"] == ["detect.sh wrote polygons with heights: they were flattened"]
+    with pytest.raises(ProgramError, match=r"wrote polygons in three dimensions.*-dim XY"):
+        rb.detect(scene, program(f"cp {file} $3"))
+
+
+def test_one_geometry_with_heights_among_others_is_refused(program, scene, tmp_path):
+    flat = json.loads(collection(scene))
+    raised = json.loads(collection(scene, z=",12.5"))["features"][0]
+    raised["geometry"] = {"type": "MultiPolygon", "coordinates": [raised["geometry"]["coordinates"]]}
+    file = tmp_path / "mixed.geojson"
+    file.write_text(json.dumps({**flat, "features": [*flat["features"], raised]}))
+    with pytest.raises(ProgramError, match="three dimensions"):
+        rb.detect(scene, program(f"cp {file} $3"))
+
+
+def test_invalid_polygons_are_repaired(program, scene, tmp_path):
+    file = tmp_path / "bow-tie.geojson"
     file.write_text(bow_tie(scene))
     found = rb.detect(scene, program(f"cp {file} $3"))
     assert [repair.action for repair in found.repairs] == ["repaired"]
