@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -35,4 +36,5 @@ def new(
     folder = output or Path(name)
     for file in write_template(template, name, folder):
         typer.echo(file)
-    say(f"Next: cd {folder} && pytest; README.md lists further commands")
+    test = "pytest" if find_spec("pytest") else "pip install pytest && pytest"
+    say(f"Next: cd {folder} && {test}; README.md lists further commands")

@@ -200,7 +200,7 @@ def test_a_cluster_gives_the_same_bits(files):
         (["--evaluation-area", "r.fgb"], "needs whole files in memory"),
         (["--join-gaps", "0.1"], "needs whole files in memory"),
         (["-e", "iou"], "compares whole files only"),
-        (["--area", "pixels", "--gsd", "0.5"], "exact areas and no pixels"),
+        (["--area", "pixels", "--gsd", "0.5"], "exact areas, not pixels"),
         (["--verdicts", "v.geojson"], "name such a file"),
         (["--building-id", "blok"], "has no column 'blok'"),
     ],

@@ -105,7 +105,7 @@ def test_check_says_what_is_missing_and_stores_nothing(place):
         (("--footprints", "mine"), "needs a --suite"),
         (("--suite", "my.toml"), "name the folder with the files"),
         ((), "name an evaluator"),
-        (("--footprints", "absent", "--suite", "my.toml"), "is no folder"),
+        (("--footprints", "absent", "--suite", "my.toml"), "is not a folder"),
     ],
 )
 def test_incomplete_requests_are_refused(place, words, reason):

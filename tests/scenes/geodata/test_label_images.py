@@ -72,7 +72,7 @@ def test_label_images_stand_on_either_side(tmp_path):
     [
         (LABELS, {"georeferenced": False}, "no affine transform"),
         (np.stack([LABELS] * 3), {}, "has 3 bands"),
-        (LABELS.astype(np.float32) / 10, {}, "no whole numbers"),
+        (LABELS.astype(np.float32) / 10, {}, "not whole numbers"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
