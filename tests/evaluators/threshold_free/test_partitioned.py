@@ -169,7 +169,7 @@ def test_a_half_written_store_is_written_anew(tmp_path):
 
 
 def test_pixels_are_refused(tmp_path):
-    with pytest.raises(UnsupportedError, match="exact areas and no pixels"):
+    with pytest.raises(UnsupportedError, match="exact areas, not pixels"):
         in_parts(tmp_path, Division(2), [], [], None, ThresholdFree(area="pixels", gsd=0.5))
 
 

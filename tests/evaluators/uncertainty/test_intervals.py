@@ -100,5 +100,5 @@ def test_one_group_and_means_over_scenes_have_no_interval():
 
 @pytest.mark.parametrize("level", [0, 100, 150, float("nan")])
 def test_a_level_that_is_no_percentage_is_refused(level):
-    with pytest.raises(ParameterError, match="no level in percent"):
+    with pytest.raises(ParameterError, match="not a level in percent"):
         block_intervals(houses(3), houses(3), level=level)

@@ -68,7 +68,7 @@ def test_a_seed_repeats_the_redraws():
 
 @pytest.mark.parametrize("error", [-0.1, 1000, float("nan")])
 def test_an_error_that_is_no_length_is_refused(error):
-    with pytest.raises(ParameterError, match="no digitising error"):
+    with pytest.raises(ParameterError, match="not a digitising error"):
         redraw_changes(HOUSES, HOUSES, error=error)
 
 
