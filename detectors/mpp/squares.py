@@ -95,14 +95,13 @@ def side_of(largest_side: float) -> float:
 
 
 def rounds_of(grid: Grid, core: _Extent, largest_side: float) -> Rounds:
-    """Return the squares on which the buildings centred in the core depend; all squares where it is the whole grid."""
+    """Return the squares of each round; chains run in those around the core alone.
+
+    The searches process the whole window: a hall that is built in the core can reach far beyond it.
+    """
     side = side_of(largest_side)
-    shifted = _squares(grid, core, side, side / 2)
+    greedy, shifted = _squares(grid, grid.extent, side, 0.0), _squares(grid, grid.extent, side, side / 2)
     around = _outer(core, side, side / 2)
-    chains = _outer(around, side, 0.0)
-    reach = math.sqrt(2.0) * largest_side
-    seen = chains[0] - reach, chains[1] - reach, chains[2] + reach, chains[3] + reach
-    greedy = _squares(grid, seen, side, 0.0)
     return Rounds(greedy, _squares(grid, around, side, 0.0), shifted if len(greedy) > 1 else [])
 
 

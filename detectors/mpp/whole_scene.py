@@ -35,8 +35,8 @@ def find_rectangles(
 ) -> tuple[Rectangles, list[Annealed]]:
     """Search every square and along their borders, close the walls and absorb parts of larger buildings.
 
-    Of a window only the squares on which its core depends are processed. Returns the rectangles, and of the sampler
-    what it found in each square; the seed is that of its random streams.
+    Of a window the chains of the sampler run only in the squares around its core. Returns the rectangles, and of the
+    sampler what it found in each square; the seed is that of its random streams.
     """
     grid, model, tables = prepared.grid, prepared.model, prepared.tables
     rounds = rounds_of(grid, prepared.core, parameters.largest_side)

@@ -83,6 +83,15 @@ def test_a_hall_of_300_m_a_row_over_four_tiles_and_a_house_on_a_seam_are_those_o
 
 
 @pytest.mark.slow
+def test_a_hall_longer_than_the_largest_rectangle_is_whole_in_small_tiles(tmp_path):
+    save_scene(street(), tmp_path / "street")
+    detect(tmp_path / "street", tmp_path / "city.gpkg", detector=make_detector("mpp"), tile=128.0)
+    found, hall = rb.read_footprints(tmp_path / "city.gpkg"), shapely.box(*STREET["hall"])
+    (match,) = [polygon for polygon in found.polygons if polygon.intersects(hall)]
+    assert match.intersection(hall).area > 0.98 * match.union(hall).area
+
+
+@pytest.mark.slow
 def test_houses_of_a_row_over_four_tiles_stay_single(tmp_path):
     save_scene(street(without=["hall"]), tmp_path / "street")
     recipe, detector = SceneRecipe.of_folder(tmp_path / "street"), make_detector("mpp[level=part,largest_side=60]")
