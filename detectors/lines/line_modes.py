@@ -28,9 +28,9 @@ PAPER: Mapping[str, Any] = {
     "same_overlap": 1.0,
 }
 
-#: As printed, where the authors' own program does not differ; its masks have pixels of 0.25 m.
+#: As printed, where the authors' own program does not differ; its masks have pixels of 0.25 m and no neighbourhood.
 PROGRAM: Mapping[str, Any] = {
-    **PAPER,
+    **{name: value for name, value in PAPER.items() if name != "neighbourhood"},
     "ground": "point-dem",
     "below_ground": 1.0,
     "marking": "cells",

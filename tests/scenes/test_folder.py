@@ -171,7 +171,7 @@ def test_a_scene_never_replaces_a_folder_with_other_files(saved, tmp_path):
         rb.save_scene(small_scenes.scene(), tmp_path / "own", overwrite=True)
 
 
-@pytest.mark.parametrize(("crs", "message"), [("EPSG:4326", "geographic"), ("EPSG:1", "no coordinate reference")])
+@pytest.mark.parametrize(("crs", "message"), [("EPSG:4326", "geographic"), ("EPSG:1", "not a coordinate reference")])
 def test_a_manifest_with_a_crs_that_cannot_be_is_refused(saved, tmp_path, crs, message):
     shutil.copytree(saved, tmp_path / "wrong")
     file = tmp_path / "wrong" / "scene.toml"
