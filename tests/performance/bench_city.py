@@ -145,10 +145,17 @@ def killed(town, copies, options):
     output = options.work / f"{copies}" / "killed" / "city.fgb"
     output.parent.mkdir(parents=True, exist_ok=True)
     process = start(town, options.detector, output, options.tile, 2)
+    done, total, others = 0, 0, []
     for line in process.stderr:
-        done, total = map(int, line.split())
+        words = line.split()
+        if len(words) != 2 or not all(word.isdigit() for word in words):
+            others.append(line)  # a warning, or why the run failed
+            continue
+        done, total = map(int, words)
         if 2 * done >= total:
             break
+    else:
+        sys.exit("".join(others[-20:]))
     process.send_signal(signal.SIGKILL)
     process.communicate()
     started = time.perf_counter()
