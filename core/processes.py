@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import IO
 
 __all__ = [
     "THREAD_LIMITS",
@@ -16,6 +19,7 @@ __all__ = [
     "end_children",
     "end_tree",
     "memory_reason",
+    "start_python",
     "time_reason",
 ]
 
@@ -52,6 +56,36 @@ def clean_environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
     """Return the environment for a child process: without the folder and the command line of this process."""
     kept = {name: value for name, value in os.environ.items() if name not in _TRACES}
     return {**kept, **THREAD_LIMITS, **(more or {})}
+
+
+def start_python(
+    code: str, *, path: str, folder: str, errors: IO[bytes] | int | None, own_session: bool = False
+) -> subprocess.Popen[bytes]:
+    """Start this Python with a clean environment; messages go through its standard input and output.
+
+    Parameters
+    ----------
+    code : str
+        What it runs.
+    path : str
+        Where it finds modules (PYTHONPATH).
+    folder : str
+        Working folder. The one of the caller holds stores and suites, which are nothing for a detector.
+    errors : file, int or None
+        Where its standard error goes.
+    own_session : bool, default False
+        Whether Ctrl-C in the terminal does not reach it.
+    """
+    return subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
+        # -P: the working directory must not come before the given path, which may hold older code.
+        [sys.executable, "-P", "-X", "faulthandler", "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        env=clean_environment({"PYTHONPATH": path}),
+        cwd=folder,
+        start_new_session=own_session,
+    )
 
 
 def end_tree(process: int) -> None:

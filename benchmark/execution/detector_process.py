@@ -17,7 +17,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import MissingInputError
-from ...core.processes import clean_environment, death_reason, end_tree
+from ...core.processes import death_reason, end_tree, start_python
 from ...detectors.base import Declaration
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.polygon_repair import Repair
@@ -147,14 +147,7 @@ class DetectorProcess:
         if self._process is None:
             self._folder = tempfile.TemporaryDirectory(prefix="roofbench-", dir=self._place, ignore_cleanup_errors=True)
             path = os.pathsep.join(entry for entry in sys.path if entry)
-            self._process = subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
-                [sys.executable, "-P", "-X", "faulthandler", "-c", _START],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self._errors,
-                env=clean_environment({"PYTHONPATH": path}),
-                cwd=self._folder.name,
-            )
+            self._process = start_python(_START, path=path, folder=self._folder.name, errors=self._errors)
         return self._process
 
 

@@ -26,10 +26,10 @@ from ...core.memory import bound_allocations, highest_memory, tree_memory
 from ...core.package import FOLDER
 from ...core.processes import (
     Limits,
-    clean_environment,
     death_reason,
     end_tree,
     memory_reason,
+    start_python,
     time_reason,
 )
 from ..store.outcomes import Cost, Outcome, ScoreFailure
@@ -128,16 +128,9 @@ class IsolatedProcess:
                 path = _search_path()
             self._folder = tempfile.TemporaryDirectory(prefix="roofbench-")
             self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
-            self._process = subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
-                # -P: the working directory must not come before the given path, which may hold older code.
-                [sys.executable, "-P", "-X", "faulthandler", "-c", _START],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self._errors,
-                env=clean_environment({"PYTHONPATH": path}),
-                # The folder of the caller holds stores and suites, which are nothing for a detector.
-                cwd=self._folder.name,
-                start_new_session=True,  # Ctrl-C reaches the caller only, which ends its workers
+            # Ctrl-C reaches the caller only, which ends its workers.
+            self._process = start_python(
+                _START, path=path, folder=self._folder.name, errors=self._errors, own_session=True
             )
         return self._process
 
