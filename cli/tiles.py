@@ -82,7 +82,8 @@ def _say(result: CityResult, output: Path, name: str) -> None:
         say(f"note: {skipped} skipped, the first at {first.label}: {reason}")
     reused = f", {result.reused} of them finished before" if result.reused else ""
     memory = f", at most {result.peak_memory / 1e6:.0f} MB in a worker" if result.peak_memory else ""
-    say(f"{output}: {result.footprints} footprints of {result.tiles} tiles{reused}{memory}")
+    found = f"{counted(result.footprints, 'footprint')} of {counted(result.tiles, 'tile')}"
+    say(f"{output}: {found}{reused}{memory}")
 
 
 @contextmanager

@@ -6,7 +6,6 @@ not detected, or as not in the reference.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -17,16 +16,14 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.wording import counted
 from .degrees import JSON_ENDINGS
+from .json_members import LARGEST_JSON, json_members, refuse_other_members
 from .shapefile_parts import damaged_rows
 
 __all__ = ["refuse_damaged"]
 
-#: Bytes: larger JSON is not read a second time.
-_LARGEST_JSON = 128 * 1024**2
-
 
 def refuse_damaged(file: Path, layer: str, missing: NDArray[np.int64], count: int) -> None:
-    """Raise `InputError` when rows without geometry have one in the file.
+    """Raise `InputError` when rows without geometry have one in the file, or members of GeoJSON were passed over.
 
     Parameters
     ----------
@@ -38,6 +35,7 @@ def refuse_damaged(file: Path, layer: str, missing: NDArray[np.int64], count: in
     count : int
         Number of rows that were read.
     """
+    refuse_other_members(file, count)
     if not len(missing):
         return
     suffix = file.suffix.lower()
@@ -80,17 +78,9 @@ def _quoted(name: str) -> str:
 
 
 def _in_json(file: Path, missing: NDArray[np.int64], count: int) -> list[int]:
-    if file.stat().st_size > _LARGEST_JSON:
+    if file.stat().st_size > LARGEST_JSON:
         return []
-    text = file.read_bytes().decode("utf-8-sig", errors="replace")
-    try:
-        whole = json.loads(text)
-        features = whole.get("features", [whole]) if isinstance(whole, dict) else []
-    except (ValueError, RecursionError):
-        try:
-            features = [json.loads(line.strip("\x1e \t\r")) for line in text.splitlines() if line.strip("\x1e \t\r")]
-        except (ValueError, RecursionError):
-            return []
+    features = json_members(file).members
     if len(features) != count:
         return []
     return [row for row in missing.tolist() if isinstance(features[row], dict) and features[row].get("geometry")]

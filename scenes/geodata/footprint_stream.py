@@ -122,8 +122,9 @@ class FootprintStream:
                 labels = labels.take(_arrow().array(outlines.ids - first))
             yield outlines, labels
             first += len(batch)
-        if self.layer is not None and missing:
-            refuse_damaged(self.file, self.layer, np.concatenate(missing), first)
+        if self.layer is not None:
+            rows = np.concatenate(missing) if missing else np.empty(0, dtype=np.int64)
+            refuse_damaged(self.file, self.layer, rows, first)
         if first < self.count:
             raise InputError(
                 f"{self.file} is truncated: {first} of the {self.count} features that its header announces are there; "

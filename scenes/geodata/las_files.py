@@ -37,6 +37,7 @@ from .las_headers import (
     refuse_cut_off,
     refuse_pointwise,
     refuse_record_counts,
+    refuse_version,
 )
 from .point_chunks import chunks_of_file, fits, met_points, refuse_broken_chunks
 from .points import PointCloud
@@ -320,6 +321,7 @@ def _opened(file: Path) -> Iterator[Any]:
         raise InputError(
             f"{file} is not a LAS file: it begins with {head[:4]!r} instead of b'LASF'; give LAS, LAZ or COPC files"
         )
+    refuse_version(file, head)
     refuse_record_counts(file, head)
     try:
         # Not laszip, which laspy would take where it is installed: the same decompressor reads everywhere.

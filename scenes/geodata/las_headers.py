@@ -10,14 +10,33 @@ from ...core.errors import CRSError, InputError
 from .crs import crs_label, file_crs, misfit, require_metric
 from .geo_keys import foreign_units, is_user_defined, user_defined_crs
 
-__all__ = ["HEADER_BYTES", "header_crs", "refuse_counts", "refuse_cut_off", "refuse_pointwise", "refuse_record_counts"]
+__all__ = [
+    "HEADER_BYTES",
+    "header_crs",
+    "refuse_counts",
+    "refuse_cut_off",
+    "refuse_pointwise",
+    "refuse_record_counts",
+    "refuse_version",
+]
 
 #: Length of the longest header (LAS 1.4), bytes.
 HEADER_BYTES = 375
+#: Versions that are read: major, and minor numbers.
+_MAJOR, _MINORS = 1, range(5)
 #: Compressor in the record of LASzip: one stream of points, without chunks.
 _POINTWISE = b"\x01\x00"
 #: How point files get another CRS.
 _REPROJECT = "reproject it, for instance with pdal's filters.reprojection, or correct its record if that is wrong"
+
+
+def refuse_version(file: Path, head: bytes) -> None:
+    """Refuse a version of LAS that is not read; its header may have other fields at other places."""
+    if len(head) > 25 and not (head[24] == _MAJOR and head[25] in _MINORS):
+        raise InputError(
+            f"{file} is of LAS version {head[24]}.{head[25]}, versions 1.0 to 1.4 are read: write it as LAS 1.4, for "
+            "instance with pdal, or copy it again if that is not its version"
+        )
 
 
 def refuse_record_counts(file: Path, head: bytes) -> None:

@@ -20,13 +20,13 @@ __all__ = ["damaged_rows", "refuse_broken_parts"]
 _HEADER = 100
 #: What to do about an index that does not fit.
 _RESTORE = (
-    "copy the file again with all its parts, or delete the .shx and restore it, for instance with ogrinfo --config "
+    "copy the file again with all its parts, or restore the .shx (delete an old one) with ogrinfo --config "
     "SHAPE_RESTORE_SHX YES"
 )
 
 
 def refuse_broken_parts(file: Path) -> None:
-    """Raise `InputError` when a .shp is cut off, or index or table have fewer rows than it has outlines."""
+    """Raise `InputError` when a .shp is cut off, has no index, or index or table have fewer rows than outlines."""
     size = file.stat().st_size
     with file.open("rb") as stream:
         head = stream.read(28)
@@ -35,6 +35,8 @@ def refuse_broken_parts(file: Path) -> None:
         raise InputError(
             f"{file} is truncated: it has {size} bytes, its header announces {announced}; copy or download it again"
         )
+    if _part(file, ".shx") is None:
+        raise InputError(f"{file}: its index ({file.stem}.shx) is missing: {_RESTORE}")
     index = _index(file)
     if index is None or not (len(index) or announced > _HEADER):
         return

@@ -245,6 +245,8 @@ def readable_layer(file: Path, layer: str | None) -> Iterator[tuple[Path, str]]:
         require_file(file, "a vector file, for instance .gpkg or .geojson")
     if file.suffix.lower() == ".shp":
         refuse_broken_parts(file)
+    if file.suffix.lower() == ".fgb":
+        _refuse_cut_header(file)
     with plain_path(file) as path:
         try:
             names = layer_names(path)
@@ -261,7 +263,21 @@ def readable_layer(file: Path, layer: str | None) -> Iterator[tuple[Path, str]]:
             yield path, layer or names[0]
         except (DataSourceError, DataLayerError) as error:
             reason = " ".join(str(error).partition("; It might help")[0].replace(str(path), str(file)).split())
-            raise InputError(f"{file} cannot be read as a vector file: {reason}") from error
+            raise InputError(
+                f"{file} cannot be read as a vector file: {reason.rstrip('.')}; copy or download it again, or write "
+                "it as a GeoPackage (.gpkg)"
+            ) from error
+
+
+def _refuse_cut_header(file: Path) -> None:
+    """Raise `InputError` when a FlatGeobuf file ends inside its header; OGR says that it has no layers."""
+    with file.open("rb") as stream:
+        head = stream.read(12)
+    size, needed = file.stat().st_size, 12 + int.from_bytes(head[8:12], "little")
+    if head[:3] == b"fgb" and (len(head) < 12 or size < needed):
+        raise InputError(
+            f"{file} is truncated: it has {size} bytes and ends inside its header; copy or download it again"
+        )
 
 
 def _read_ogr(

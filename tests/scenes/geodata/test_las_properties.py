@@ -3,6 +3,7 @@
 import struct
 
 import laspy
+import lazrs
 import numpy as np
 import pyproj
 import pytest
@@ -11,6 +12,7 @@ from laspy.vlrs.known import GeoKeyEntryStruct, WktCoordinateSystemVlr
 from roofbench.core.errors import CRSError, InputError
 from roofbench.scenes.geodata.coloured_points import image_from_points
 from roofbench.scenes.geodata.las_files import read_las_header, read_points
+from roofbench.scenes.geodata.point_chunks import chunk_size
 
 WEST, SOUTH = 500000.0, 5500000.0
 
@@ -258,3 +260,36 @@ def test_bounds_that_end_before_they_begin_are_refused(tmp_path):
     file = with_bounds(write(tmp_path / "a.las"), WEST, WEST + 20)
     with pytest.raises(InputError, match="bounds in its header end before they begin"):
         read_las_header(file)
+
+
+@pytest.mark.parametrize("version", [(0, 9), (1, 5), (2, 0)])
+def test_other_versions_of_las_are_refused_by_their_number(tmp_path, version):
+    file = write(tmp_path / "a.las", version="1.2")
+    content = bytearray(file.read_bytes())
+    content[24:26] = bytes(version)
+    file.write_bytes(content)
+    with pytest.raises(InputError, match=f"is of LAS version {version[0]}.{version[1]}, versions 1.0 to 1.4 are read"):
+        read_las_header(file)
+
+
+def test_chunks_of_varying_numbers_of_points_are_read(tmp_path):
+    file = write(tmp_path / "a.las", version="1.2")
+    plain = laspy.read(file)
+    header = laspy.LasHeader(version="1.2", point_format=plain.header.point_format.id)
+    header.scales, header.offsets = plain.header.scales, plain.header.offsets
+    record = lazrs.LazVlr.new_for_compression(header.point_format.id, 0, True)
+    header.vlrs.append(laspy.vlrs.known.LasZipVlr(record.record_data()))
+    header.update(plain.points)
+    header.are_points_compressed = True
+    rows = np.frombuffer(plain.points.array.tobytes(), np.uint8).reshape(len(plain), -1)
+    with (tmp_path / "b.laz").open("wb") as stream:
+        header.write_to(stream)
+        compressor = lazrs.LasZipCompressor(stream, record)
+        for part in np.split(rows, [1, 40, 41, 300]):
+            compressor.compress_many(part.ravel())
+            compressor.finish_current_chunk()
+        compressor.done()
+    with laspy.open(tmp_path / "b.laz") as reader:
+        assert chunk_size(reader.header) is None
+    one, two = read_points(tmp_path / "b.laz"), read_points(file)
+    assert (one.x.tolist(), one.z.tolist()) == (two.x.tolist(), two.z.tolist())

@@ -330,3 +330,45 @@ def test_a_crs_that_ends_early_is_replaced_by_the_one_that_is_given(tmp_path):
     path = shapefile(tmp_path / "crs.shp")
     path.with_suffix(".prj").write_text('GEOGCS["x"')
     assert read_footprints(path, crs="EPSG:25832").crs == "EPSG:25832"
+
+
+@pytest.mark.parametrize("member", [5, "a", None, [1], {}, {"type": "Polygon", "coordinates": []}])
+@pytest.mark.parametrize("place", [0, 1, 3])
+def test_a_member_of_json_that_is_no_feature_is_not_left_out(tmp_path, member, place):
+    path = tmp_path / "a.geojson"
+    whole = collection(SQUARES)
+    whole["features"][1]["properties"] = {"list": [{"a": 1}, 5, "b"], "features": [1]}
+    path.write_text(json.dumps(whole))
+    assert len(read_footprints(path, crs="EPSG:25832")) == 3  # such properties are no members
+    whole["features"].insert(place, member)
+    path.write_text(json.dumps(whole))
+    with pytest.raises(InputError, match=rf"1 member is not a feature \(the first is member {place}\)"):
+        read_footprints(path, crs="EPSG:25832")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda lines: [lines[0], lines[1][:50], lines[2]],
+        lambda lines: [lines[0], "5", *lines[1:]],
+        lambda lines: [lines[0] + lines[1], lines[2]],
+        lambda lines: [lines[0], "", "\x1e" + lines[1], lines[2]],
+    ],
+    ids=["cut", "a number", "two in a line", "separators in part"],
+)
+def test_a_line_of_json_that_is_no_feature_is_not_left_out(tmp_path, change):
+    path = tmp_path / "a.geojsonl"
+    lines = [json.dumps(feature) for feature in collection(SQUARES)["features"]]
+    path.write_text("\n".join(lines))
+    assert len(read_footprints(path, crs="EPSG:25832")) == 3
+    path.write_text("\n".join(change(lines)))
+    with pytest.raises(InputError, match=r"1 line is not a feature|of its 3 lines can be read"):
+        read_footprints(path, crs="EPSG:25832")
+
+
+@pytest.mark.parametrize("size", [3, 8, 20, 100])
+def test_a_flatgeobuf_that_ends_inside_its_header_is_refused(tmp_path, size):
+    write_footprints(Footprints.of(SQUARES, crs="EPSG:25832"), tmp_path / "a.fgb")
+    (tmp_path / "b.fgb").write_bytes((tmp_path / "a.fgb").read_bytes()[:size])
+    with pytest.raises(InputError, match=f"is truncated: it has {size} bytes and ends inside its header"):
+        read_footprints(tmp_path / "b.fgb")
