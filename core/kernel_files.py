@@ -3,6 +3,8 @@
 A file holds the SHA-256 of its content and then the content. It appears whole or not at all; a damaged file is removed
 and counts as absent. Reading an entry renews its date, so that cleaning removes what was not used for a month and, when
 the folder is still too large, what was not used for longest.
+
+Processes that need the same entry at the same time compile it once: the first one reserves it, the others wait for it.
 """
 
 from __future__ import annotations
@@ -13,9 +15,17 @@ import os
 import shutil
 import tempfile
 import time
+import zlib
 from pathlib import Path
+from typing import IO, Any
 
-__all__ = ["clean", "default_folder", "load", "names", "remove", "save"]
+fcntl: Any
+try:
+    import fcntl
+except ImportError:  # Windows: each process compiles for itself
+    fcntl = None
+
+__all__ = ["clean", "default_folder", "load", "names", "remove", "reserve", "save"]
 
 _SUFFIX = ".kernel"
 _CHECKSUM = 32  # bytes of a SHA-256
@@ -24,6 +34,10 @@ _DAY = 86_400.0
 _OLDEST = 30 * _DAY
 #: Size that a cleaned folder does not exceed, bytes. The kernels of `mpp` and the line detectors take 16 MB.
 _LARGEST = 512_000_000
+#: Longest wait for the process that compiles an entry, s; one that was suspended may never finish.
+_PATIENCE = 120.0
+_PAUSE = 0.02  # s between two attempts
+_RESERVED = "reserved.lock"
 
 
 def default_folder() -> Path:
@@ -61,6 +75,46 @@ def load(folder: Path, name: str) -> bytes | None:
         if time.time() - path.stat().st_mtime > _DAY:
             os.utime(path)
     return data[_CHECKSUM:]
+
+
+def reserve(folder: Path, name: str, *, patience: float = _PATIENCE) -> IO[bytes] | None:
+    """Wait until no other process compiles an entry, and reserve it for this process.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+    patience : float
+        Longest wait, s.
+
+    Returns
+    -------
+    file or None
+        Closing it, or the end of the process, ends the reservation. A process holds one at a time. None where the
+        folder, the file system or the platform has no locks, and after the longest wait.
+    """
+    if fcntl is None:
+        return None
+    deadline = time.monotonic() + patience
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = (folder / _RESERVED).open("ab")
+    except OSError:
+        return None
+    while True:
+        try:
+            # One byte of one file stands for each entry, so that no file is left behind.
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, zlib.crc32(name.encode()) >> 1)
+        except (BlockingIOError, PermissionError):
+            if time.monotonic() < deadline:
+                time.sleep(_PAUSE)
+                continue
+        except OSError:
+            pass
+        else:
+            return file
+        file.close()
+        return None
 
 
 def save(folder: Path, name: str, content: bytes) -> None:

@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import IO, Any
 
 import llvmlite
 import numba
@@ -32,6 +32,7 @@ import numpy as np
 from numba.core import ccallback, config, dispatcher, serialize, sigutils
 from numba.core import types as numba_types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache
+from numba.core.compiler_lock import global_compiler_lock
 from numba.np.ufunc import ufuncbuilder, wrappers
 
 from . import inner_kernels, kernel_files
@@ -80,7 +81,7 @@ def kernel(function: Any = None, *, inline: str = "never") -> Any:
     if isinstance(compiled, _Dispatcher):  # it is the function itself under NUMBA_DISABLE_JIT
         compiled._cache = _KernelCache(compiled, files=False)
         compiled.get_call_template = partial(_call_without_literals, compiled)
-        compiled.compile = partial(inner_kernels.compile_kernel, compiled)
+        compiled.compile = partial(_compile, compiled)
     return compiled
 
 
@@ -93,6 +94,15 @@ def _call_without_literals(compiled: Any, arguments: Any, named: Any) -> Any:
     return _Dispatcher.get_call_template(
         compiled, plain, {name: _types.unliteral(kind) for name, kind in named.items()}
     )
+
+
+def _compile(compiled: Any, signature: Any) -> Any:
+    """Compile a kernel for argument types, or take the entry that another process is writing."""
+    with global_compiler_lock:
+        try:
+            return inner_kernels.compile_kernel(compiled, signature)
+        finally:
+            compiled._cache.end_reservation()
 
 
 def cache_folder() -> Path:
@@ -143,6 +153,7 @@ class _KernelCache(FunctionCache):
         self._files = files
         self._impl = _Results(dispatcher.py_func)
         self._names: dict[Any, str] = {}
+        self._reserved: IO[bytes] | None = None
         self.enable()
 
     @property
@@ -152,6 +163,12 @@ class _KernelCache(FunctionCache):
     def flush(self) -> None:
         """Forget nothing on disk: an entry is right as long as its key is asked for."""
 
+    def end_reservation(self) -> None:
+        """Let other processes compile or load what this one reserved."""
+        reserved, self._reserved = self._reserved, None
+        if reserved is not None:
+            reserved.close()
+
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         if not self._enabled:
             return None
@@ -160,6 +177,10 @@ class _KernelCache(FunctionCache):
         except UnknownCodeError:
             return None
         content = kernel_files.load(cache_folder(), name)
+        if content is None and not self._files and not inner_kernels.compiles_inner():
+            # Only the outermost kernel is reserved: two processes never wait for each other.
+            self._reserved = kernel_files.reserve(cache_folder(), name)
+            content = kernel_files.load(cache_folder(), name)
         if content is None:
             return None
         try:

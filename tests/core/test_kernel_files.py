@@ -1,9 +1,13 @@
 import os
+import subprocess
+import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
+import roofbench
 from roofbench.core import kernel_files
 
 
@@ -93,3 +97,40 @@ def test_cleaning_the_default_folder_removes_the_layout_of_the_first_version(tmp
 def test_a_folder_that_is_not_there_is_clean(tmp_path):
     kernel_files.clean(tmp_path / "nowhere")
     assert not list(tmp_path.iterdir())
+
+
+#: Reserves an entry, says so, and holds it until its standard input closes.
+HOLDER = """
+import sys
+from pathlib import Path
+from roofbench.core import kernel_files
+held = kernel_files.reserve(Path(sys.argv[1]), "a")
+print(held is not None, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(kernel_files.fcntl is None, reason="no file locks on this platform")
+def test_an_entry_is_reserved_by_one_process_until_that_ends(tmp_path):
+    root = Path(roofbench.__file__).parents[1]
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDER, str(tmp_path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(root), *filter(None, sys.path)])},
+    ) as holder:
+        assert holder.stdout.readline() == b"True\n"
+        assert kernel_files.reserve(tmp_path, "a", patience=0.05) is None
+        other = kernel_files.reserve(tmp_path, "b", patience=0.05)
+        assert other is not None
+        other.close()
+        holder.kill()
+        holder.wait()
+        after = kernel_files.reserve(tmp_path, "a")
+        assert after is not None
+        after.close()
+
+
+def test_a_folder_that_cannot_be_made_reserves_nothing(tmp_path):
+    (tmp_path / "file").write_text("")
+    assert kernel_files.reserve(tmp_path / "file" / "folder", "a") is None

@@ -70,6 +70,34 @@ def test_a_change_anywhere_below_is_seen_and_nothing_else_compiles_again(tmp_pat
     assert python(CALL, there, cache)[0] == ["20.0", "1"]
 
 
+#: Calls a kernel when the other process is ready, too; prints whether its compiled form was loaded.
+TOGETHER = """
+import sys, time
+from pathlib import Path
+from top import top
+Path(sys.argv[1]).touch()
+while not Path(sys.argv[2]).exists():
+    time.sleep(0.001)
+print(top(1.0), sum(top.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.skipif(kernel_files.fcntl is None, reason="no file locks on this platform")
+def test_two_processes_at_the_same_time_compile_a_kernel_once(tmp_path):
+    here, cache = write(tmp_path / "here", OWN), tmp_path / "cache"
+    runs = [
+        subprocess.Popen(
+            [sys.executable, "-c", TOGETHER, own, other],
+            env=environment(cache),
+            cwd=here,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for own, other in (("first", "second"), ("second", "first"))
+    ]
+    assert sorted(run.communicate(timeout=120)[0] for run in runs) == ["20.0 0\n", "20.0 1\n"]
+
+
 def test_the_fields_of_a_named_tuple_that_is_an_argument_count(tmp_path):
     files = {
         "frames.py": "from typing import NamedTuple\nclass Frame(NamedTuple):\n    width: float\n    depth: float\n",
