@@ -14,8 +14,7 @@ spare
 cut
     A footprint that reaches the rim of a tile's halo inside the scene: the tile may not see all of it.
 seam pass
-    What follows the last tile: of footprints that two tiles found (IoU above 0.5) one stays; a cut one is replaced by
-    the whole one, or joined with the cut parts of other tiles; a spare one is added where nothing else stands.
+    What follows the last tile (`detectors.seams`).
 
 A tile depends on the scene and on its column and row, never on another tile, so that the result is independent of the
 order of the tiles and of the number of workers.
@@ -28,7 +27,7 @@ import itertools
 import math
 import statistics
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -46,9 +45,7 @@ __all__ = [
     "CUT",
     "SPARE",
     "Measured",
-    "Seams",
     "Tile",
-    "join_tiles",
     "measure",
     "owned",
     "stream_of",
@@ -58,11 +55,8 @@ __all__ = [
 
 #: Attributes of the footprints of a tile that say which are cut and which are spare; `join_tiles` removes them.
 CUT, SPARE = "cut_by_tile", "spare_of_tile"
-#: Metres around a core in which footprints are spare, and the share of one that others may cover where it is added.
-_NEAR, _FREE = 30.0, 0.25
-#: Footprints of different tiles with more than this IoU are one; a cut one is replaced where another covers so much of
-#: it.
-_SAME, _COVERED = 0.5, 0.5
+#: Metres around a core in which footprints are spare.
+_NEAR = 30.0
 #: Metres from the rim of the halo within which a footprint counts as cut.
 _RIM = 1.0
 #: Number of places at which a scene is measured and surveyed, their width and their halo, metres.
@@ -127,27 +121,6 @@ class Measured(NamedTuple):
     parameters: dict[str, float]
     ground_cell: float | None
     whole: dict[str, Any]
-
-
-class Seams(NamedTuple):
-    """What the seam pass did, numbers of footprints.
-
-    Attributes
-    ----------
-    doubles : int
-        Left out because another tile found the same.
-    cut : int
-        Left out because another tile sees the whole of it.
-    joined : int
-        Cut parts that were joined into fewer.
-    added : int
-        Spare ones that were added.
-    """
-
-    doubles: int
-    cut: int
-    joined: int
-    added: int
 
 
 def tiles_over(extent: _Extent, side: float) -> list[Tile]:
@@ -253,128 +226,3 @@ def owned(found: Footprints, tile: Tile, part: _Extent, whole: _Extent) -> Footp
     # What a tile sees in part and does not own is seen whole by others.
     found, spare, cut = found.take(~(spare & cut)), spare[~(spare & cut)], cut[~(spare & cut)]
     return dataclasses.replace(found, attributes={**found.attributes, CUT: cut, SPARE: spare})
-
-
-def join_tiles(
-    parts: Mapping[Tile, Footprints], *, crs: str | None, numbers: Sequence[str] = (), source: str = "footprints"
-) -> tuple[Footprints, Seams]:
-    """Return the footprints of all tiles after the seam pass, by row and column of their tile, and what it did.
-
-    Parameters
-    ----------
-    parts : mapping of Tile to Footprints
-        As `owned` returns them.
-    crs : str, optional
-    numbers : sequence of str
-        Attributes that number buildings within a tile; they and building ids become unique.
-    source : str
-    """
-    tiles = [tile for tile in sorted(parts) if len(parts[tile])]
-    if not tiles:
-        return Footprints.empty(crs=crs, source=source), Seams(0, 0, 0, 0)
-    whole = _concatenated([parts[tile] for tile in tiles], numbers, crs, source)
-    tile_of = np.repeat(np.arange(len(tiles)), [len(parts[tile]) for tile in tiles])
-    depth = np.concatenate([tile.depth(parts[tile].centres) for tile in tiles])
-    columns = dict(whole.attributes)
-    cut, spare = columns.pop(CUT).astype(np.bool_), columns.pop(SPARE).astype(np.bool_)
-    owned_rows = np.flatnonzero(~spare)
-    kept = np.zeros(len(whole), dtype=np.bool_)
-    kept[owned_rows], groups = _seam_pass(
-        whole.polygons[owned_rows], tile_of[owned_rows], depth[owned_rows], cut[owned_rows]
-    )
-    joined = {int(owned_rows[first]): owned_rows[group].tolist() for first, group in groups.items()}
-    polygons = whole.polygons.copy()
-    for first, group in joined.items():
-        polygons[first] = shapely.union_all(polygons[group])
-        kept[[row for row in group if row != first]] = False
-    lost = np.concatenate([np.asarray(group) for group in joined.values()]) if joined else np.empty(0, dtype=np.intp)
-    in_groups = np.zeros(len(whole), dtype=np.bool_)
-    in_groups[lost] = True
-    added = _added(polygons, kept, np.flatnonzero(spare), depth)
-    seams = Seams(
-        doubles=int((~kept & ~cut & ~spare).sum()),
-        cut=int((~kept & cut & ~in_groups).sum()),
-        joined=int(in_groups.sum()),
-        added=len(added),
-    )
-    kept[added] = True
-    result = dataclasses.replace(whole, polygons=polygons, attributes=columns).take(kept)
-    return dataclasses.replace(result, ids=np.arange(len(result), dtype=np.int64)), seams
-
-
-def _seam_pass(
-    polygons: NDArray[np.object_], tile_of: NDArray[np.intp], depth: NDArray[np.float64], cut: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], dict[int, list[int]]]:
-    """Return which footprints stay, and groups of cut ones that are one, by their largest."""
-    first, second = shapely.STRtree(polygons).query(polygons, predicate="intersects")
-    across = tile_of[first] != tile_of[second]
-    first, second = first[across], second[across]
-    common = shapely.area(shapely.intersection(polygons[first], polygons[second]))
-    area = shapely.area(polygons)
-    kept = np.ones(len(polygons), dtype=np.bool_)
-    same = (common > _SAME * (area[first] + area[second] - common)) & ~(cut[first] & cut[second])
-    rivals: dict[int, list[int]] = defaultdict(list)
-    for one, other in zip(first[same].tolist(), second[same].tolist(), strict=True):
-        rivals[one].append(other)
-    # Whole ones first, then those that lie deepest in their tile: they are seen with the most around them.
-    settled = np.zeros(len(polygons), dtype=np.bool_)
-    for row in sorted(rivals, key=lambda row: (cut[row], -depth[row], row)):
-        kept[row] = not any(settled[other] for other in rivals[row])
-        settled[row] = kept[row]
-    covered = kept[second] & ~cut[second] & cut[first] & (common > _COVERED * area[first])
-    kept[first[covered]] = False
-    groups: dict[int, list[int]] = {}
-    overlap = kept[first] & kept[second] & cut[first] & cut[second] & (common > 0)
-    if overlap.any():
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        links = coo_array((np.ones(overlap.sum()), (first[overlap], second[overlap])), shape=(len(polygons),) * 2)
-        label = connected_components(links, directed=False)[1]
-        for number in np.unique(label[first[overlap]]).tolist():
-            rows = np.flatnonzero(label == number)
-            groups[int(rows[np.argmax(area[rows])])] = rows.tolist()
-    return kept, groups
-
-
-def _added(
-    polygons: NDArray[np.object_], kept: NDArray[np.bool_], spare: NDArray[np.intp], depth: NDArray[np.float64]
-) -> list[int]:
-    """Return the spare footprints of which kept ones and added ones cover little, the nearest to its tile first.
-
-    The owner of a place can have merged a house with its neighbours into a footprint that is centred in another tile,
-    where they are found one by one.
-    """
-    standing = np.flatnonzero(kept)
-    first, second = shapely.STRtree(polygons[standing]).query(polygons[spare], predicate="intersects")
-    common = shapely.area(shapely.intersection(polygons[spare[first]], polygons[standing[second]]))
-    covered = np.bincount(first, weights=common, minlength=len(spare))
-    free = spare[covered <= _FREE * shapely.area(polygons[spare])]
-    added: list[int] = []
-    for row in free[np.lexsort((free, -depth[free]))].tolist():
-        overlap = shapely.area(shapely.intersection(polygons[row], polygons[added])).sum() if added else 0.0
-        if overlap <= _FREE * polygons[row].area:
-            added.append(row)
-    return added
-
-
-def _concatenated(parts: Sequence[Footprints], numbers: Sequence[str], crs: str | None, source: str) -> Footprints:
-    columns: dict[str, NDArray[Any]] = {}
-    for name in parts[0].attributes:
-        columns[name] = np.concatenate([part.attributes[name] for part in parts])
-    for name in set(numbers) & set(columns):
-        columns[name] = _renumbered([part.attributes[name] for part in parts])
-    labels = None
-    if any(part.building_ids is not None for part in parts):
-        labels = _renumbered([part.building_codes for part in parts])
-    polygons = np.concatenate([part.polygons for part in parts])
-    return Footprints(polygons=polygons, building_ids=labels, crs=crs, attributes=columns, source=source)
-
-
-def _renumbered(columns: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
-    """Return numbers of several results as one column, no number twice."""
-    start, found = 0, []
-    for column in columns:
-        found.append(column.astype(np.int64) + start)
-        start += int(column.max()) + 1 if len(column) else 0
-    return np.concatenate(found)

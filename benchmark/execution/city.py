@@ -11,7 +11,7 @@ work folder
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -22,8 +22,11 @@ from ...core.digests import digest
 from ...core.errors import OutputError, ParameterError
 from ...core.output import check_target, whole_file
 from ...detectors.base import Detector
-from ...detectors.tiling import Measured, Seams, Tile, measure, tiles_of
-from ...scenes.geodata.vector_files import output_driver, write_footprints
+from ...detectors.seams import Seams, join_strips
+from ...detectors.tiling import Measured, Tile, measure, tiles_of
+from ...scenes.geodata.footprint_strips import write_strips
+from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.vector_files import output_driver
 from ...scenes.scene import Scene
 from ..identity.keys import module_closure
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
@@ -31,7 +34,7 @@ from ..store.outcomes import Outcome
 from .executors import Execution, slots_of
 from .isolation import call_isolated
 from .tasks import Task, TilePart
-from .tile_outcomes import join_outcomes
+from .tile_outcomes import stored_parts, survey_tiles
 from .worker import execute_text
 
 __all__ = ["City", "CityResult", "TileWork", "detect_city", "plan_tiles", "remove_tiles", "run_tiles", "work_key"]
@@ -154,21 +157,29 @@ def detect_city(
     waiting = [job for job in work.jobs if not job.file.exists()]
     failed = run_tiles(work, execution, progress)
     files = {job.tile: job.file for job in work.jobs if job.tile not in failed}
-    joined = join_outcomes(files, detector, work.scene.crs)
-    write_footprints(joined.footprints, output, overwrite=overwrite)
+    survey = survey_tiles(files)
+    seams = Seams(0, 0, 0, 0)
+
+    def strips() -> Iterator[Footprints]:
+        nonlocal seams
+        for strip, done in join_strips(stored_parts(files), survey.facts, numbers=detector.numbers):
+            seams = Seams(*map(sum, zip(seams, done, strict=True)))
+            yield strip
+
+    count = write_strips(strips(), output, crs=work.scene.crs, types=survey.facts.kinds, overwrite=overwrite)
     left_out = work.scene.left_out
     if not failed and not left_out:
         remove_tiles(work.folder)
     return CityResult(
-        footprints=len(joined.footprints),
+        footprints=count,
         tiles=len(work.jobs),
         reused=len(work.jobs) - len(waiting),
-        seams=joined.seams,
+        seams=seams,
         failed=dict(sorted(failed.items())),
-        skipped=joined.skipped,
+        skipped=survey.skipped,
         left_out=left_out,
         measured=work.measured,
-        peak_memory=joined.cost.peak_memory,
+        peak_memory=survey.cost.peak_memory or 0,
     )
 
 

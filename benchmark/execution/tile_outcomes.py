@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 
-from ...detectors.base import Declaration, Detector
-from ...detectors.tiling import Seams, Tile, join_tiles
+from ...detectors.seams import TileFacts, tile_facts
+from ...detectors.tiling import Tile
 from ...scenes.geodata.footprints import Footprints
 from ..store.outcomes import Cost, Outcome
 
-__all__ = ["JoinedTiles", "join_outcomes", "tile_of_file"]
+__all__ = ["TileSurvey", "stored_parts", "survey_tiles", "tile_of_file"]
 
 
-class JoinedTiles(NamedTuple):
-    """A city.
+class TileSurvey(NamedTuple):
+    """What the finished tiles say besides their footprints.
 
     Attributes
     ----------
-    footprints : Footprints
-    seams : Seams
+    facts : TileFacts
+        What must be known before they are joined.
     skipped : dict of Tile to str
         Tiles that lack an input of the detector, with the reason.
     cost : Cost
@@ -33,8 +33,7 @@ class JoinedTiles(NamedTuple):
         Of all tiles, each once.
     """
 
-    footprints: Footprints
-    seams: Seams
+    facts: TileFacts
     skipped: dict[Tile, str]
     cost: Cost
     notes: tuple[str, ...]
@@ -46,24 +45,37 @@ def tile_of_file(file: Path, side: float) -> Tile:
     return Tile(row, column, side)
 
 
-def join_outcomes(files: Mapping[Tile, Path], detector: Detector | Declaration, crs: str | None) -> JoinedTiles:
-    """Join the stored outcomes of the tiles that are finished."""
-    parts: dict[Tile, Footprints] = {}
+def survey_tiles(files: Mapping[Tile, Path]) -> TileSurvey:
+    """Read the outcomes of finished tiles one by one, and keep none."""
     skipped: dict[Tile, str] = {}
     notes: dict[str, None] = {}
     seconds, cpu_seconds, peak = 0.0, 0.0, 0
+
+    def parts() -> Iterator[tuple[Tile, Footprints]]:
+        nonlocal seconds, cpu_seconds, peak
+        for tile, outcome in _outcomes(files):
+            seconds, cpu_seconds = seconds + outcome.cost.seconds, cpu_seconds + outcome.cost.cpu_seconds
+            peak = max(peak, outcome.cost.peak_memory or 0)
+            if outcome.status == "skipped":
+                skipped[tile] = str(outcome.reason)
+            elif outcome.status == "ok":
+                notes.update(dict.fromkeys(outcome.metadata.get("notes", ())))
+                yield tile, _footprints(outcome)
+
+    facts = tile_facts(parts())
+    return TileSurvey(facts, skipped, Cost(seconds=seconds, cpu_seconds=cpu_seconds, peak_memory=peak), tuple(notes))
+
+
+def stored_parts(files: Mapping[Tile, Path]) -> Iterator[tuple[Tile, Footprints]]:
+    """Yield what each finished tile found, by row and column."""
+    for tile, outcome in _outcomes(files):
+        if outcome.status == "ok":
+            yield tile, _footprints(outcome)
+
+
+def _outcomes(files: Mapping[Tile, Path]) -> Iterator[tuple[Tile, Outcome]]:
     for tile, file in sorted(files.items()):
-        outcome = Outcome.from_bytes(file.read_bytes())
-        seconds, cpu_seconds = seconds + outcome.cost.seconds, cpu_seconds + outcome.cost.cpu_seconds
-        peak = max(peak, outcome.cost.peak_memory or 0)
-        if outcome.status == "skipped":
-            skipped[tile] = str(outcome.reason)
-        elif outcome.status == "ok":
-            parts[tile] = _footprints(outcome)
-            notes.update(dict.fromkeys(outcome.metadata.get("notes", ())))
-    found, seams = join_tiles(parts, crs=crs, numbers=detector.numbers, source=detector.name)
-    cost = Cost(seconds=seconds, cpu_seconds=cpu_seconds, peak_memory=peak)
-    return JoinedTiles(found, seams, skipped, cost, tuple(notes))
+        yield tile, Outcome.from_bytes(file.read_bytes())
 
 
 def _footprints(outcome: Outcome) -> Footprints:

@@ -25,8 +25,9 @@ from ...core.wording import counted
 from ...detectors.base import Declaration, Detector
 from ...detectors.checks import checked_output
 from ...detectors.external.precomputed import Precomputed
+from ...detectors.seams import join_tiles
 from ...detectors.streams import random_stream
-from ...detectors.tiling import Tile, join_tiles, measure, owned, stream_of, tiles_of
+from ...detectors.tiling import Tile, measure, owned, stream_of, tiles_of
 from ...evaluators.base import Evaluator
 from ...evaluators.in_parts import ThresholdFree, evaluate_sets
 from ...scenes.geodata.footprints import Footprints
@@ -40,7 +41,7 @@ from .read_ahead import ReadAhead
 from .run_time import Stopwatch, reason_of
 from .scene_picture import scene_picture
 from .tasks import Task, TilePart
-from .tile_outcomes import join_outcomes, tile_of_file
+from .tile_outcomes import stored_parts, survey_tiles, tile_of_file
 
 __all__ = ["describe", "detect", "execute", "execute_text", "machine_facts", "score"]
 
@@ -240,11 +241,13 @@ def _read_ahead(scene: Scene, recipe: SceneRecipe, part: TilePart) -> None:
 def _joined_city(scene: Scene, detector: Declaration, task: Task) -> tuple[Footprints, Cost]:
     """Return the city of stored tiles, and what they cost."""
     files = {tile_of_file(Path(file), task.scene.tile): Path(file) for file in task.tiles}
-    joined = join_outcomes(files, detector, scene.crs)
-    if len(joined.skipped) == len(files):
-        raise MissingInputError(next(iter(joined.skipped.values())))
-    metadata = {"notes": list(joined.notes)} if joined.notes else {}
-    return dataclasses.replace(joined.footprints, metadata=metadata), joined.cost
+    survey = survey_tiles(files)
+    if len(survey.skipped) == len(files):
+        raise MissingInputError(next(iter(survey.skipped.values())))
+    parts = dict(stored_parts(files))
+    found, _ = join_tiles(parts, crs=scene.crs, numbers=detector.numbers, source=detector.name)
+    metadata = {"notes": list(survey.notes)} if survey.notes else {}
+    return dataclasses.replace(found, metadata=metadata), survey.cost
 
 
 def _window(scene: Scene, part: TilePart) -> Scene:

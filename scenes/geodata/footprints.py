@@ -14,8 +14,8 @@ Source of the definitions: Awrangjeb, Ravanbakhsh & Fraser (2010), section 4.1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, overload
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import geopandas as gpd
     from matplotlib.axes import Axes
 
-__all__ = ["Footprints"]
+__all__ = ["Footprints", "stacked"]
 
 #: Widest gap that is closed between footprints, metres: no two houses so far apart are one block.
 _WIDEST_GAP = 100.0
@@ -355,3 +355,14 @@ def _as_column(values: Any) -> NDArray[Any]:
     items = list(values)
     plain = all(isinstance(item, str) for item in items) or all(isinstance(item, int | np.integer) for item in items)
     return np.array(items) if plain and items else np.array(items, dtype=object)
+
+
+def stacked(parts: Sequence[Footprints]) -> Footprints:
+    """Return the footprints of several sets with the same columns, one after the other; the rest is of the first."""
+    columns = {name: np.concatenate([part.attributes[name] for part in parts]) for name in parts[0].attributes}
+    labels = None
+    if parts[0].building_ids is not None:
+        labels = np.concatenate([np.asarray(part.building_ids) for part in parts])
+    polygons = np.concatenate([part.polygons for part in parts])
+    ids = np.concatenate([part.ids for part in parts])
+    return replace(parts[0], polygons=polygons, building_ids=labels, attributes=columns, ids=ids)

@@ -38,14 +38,18 @@ from .wkb import geometries_of_wkb
 __all__ = [
     "DRIVERS",
     "building_column",
+    "layer_name",
     "named_or_none",
     "output_driver",
     "read_footprints",
     "read_polygon",
     "readable_layer",
+    "require_writable_crs",
     "split_layer",
+    "table_of",
     "write_footprints",
     "write_layers",
+    "write_ogr",
 ]
 #: Geometry type of shapely to that of OGR.
 _KINDS = {1: "LineString", 3: "Polygon", 5: "MultiLineString", 6: "MultiPolygon", 0: "Point", 4: "MultiPoint"}
@@ -176,12 +180,22 @@ def write_footprints(
     OutputError
         Unknown file ending, file that exists already, folder that is missing or read-only.
     """
+    file = Path(path)
+    table = footprints.polygons, table_of(footprints)
+    write_layers({layer or layer_name(file): table}, file, crs=footprints.crs, overwrite=overwrite)
+
+
+def table_of(footprints: Footprints) -> dict[str, NDArray[Any]]:
+    """Return the columns that a file of footprints has: attributes, and building ids where there are any."""
     columns = dict(footprints.attributes)
     if footprints.building_ids is not None:
         columns["building_id"] = footprints.building_ids
-    file = Path(path)
-    name = (layer or file.stem).encode(errors="backslashreplace").decode()  # names of files need not be UTF-8
-    write_layers({name: (footprints.polygons, columns)}, file, crs=footprints.crs, overwrite=overwrite)
+    return columns
+
+
+def layer_name(file: Path) -> str:
+    """Return the name of the layer of a file with one; names of files need not be UTF-8, those of layers are."""
+    return file.stem.encode(errors="backslashreplace").decode()
 
 
 def output_driver(path: str | os.PathLike[str]) -> str:
@@ -213,24 +227,26 @@ def write_layers(
     driver = output_driver(file)
     if len(layers) > 1 and driver != "GPKG":
         raise OutputError(f"{file}: {len(layers)} layers ({', '.join(layers)}) need a GeoPackage: name it .gpkg")
+    require_writable_crs(crs, driver, file)
+    with whole_file(file, overwrite=overwrite) as scratch, plain_target(scratch) as plain:
+        for number, (layer, (geometries, table)) in enumerate(layers.items()):
+            columns = storable_columns(table, driver, file)
+            if driver == "Parquet":
+                write_parquet(plain, geometries, columns, crs)
+            else:
+                write_ogr(plain, driver, layer, geometries, columns, crs, append=number > 0)
+        if styles and driver == "GPKG":
+            add_layer_styles(plain, styles)
+
+
+def require_writable_crs(crs: str | None, driver: str, file: Path) -> None:
+    """Raise `OutputError` for a CRS that the format cannot name."""
     if crs is not None:
         known = parse_crs(crs)
         if driver == "GeoJSON" and known.to_authority(min_confidence=100) is None:
             raise OutputError(
                 f"{file}: GeoJSON names a CRS by its EPSG code, and {known.name!r} has none: write a GeoPackage (.gpkg)"
             )
-    with whole_file(file, overwrite=overwrite) as scratch, plain_target(scratch) as plain:
-        for number, (layer, (geometries, table)) in enumerate(layers.items()):
-            columns = storable_columns(table, driver, file)
-            # GDAL keeps some beginnings for itself, and takes no sign as the first letter.
-            if driver == "GPKG" and (layer.lower().startswith(("gpkg", "sqlite")) or not layer[:1].isalnum()):
-                layer = f"layer_{layer}"
-            if driver == "Parquet":
-                write_parquet(plain, geometries, columns, crs)
-            else:
-                _write_ogr(plain, driver, layer, geometries, columns, crs, append=number > 0)
-        if styles and driver == "GPKG":
-            add_layer_styles(plain, styles)
 
 
 @contextmanager
@@ -300,7 +316,7 @@ def named_or_none(crs: str) -> str | None:
     return crs if crs.upper().startswith("EPSG:") else crs if file_crs(parse_crs(crs)) is not None else None
 
 
-def _write_ogr(
+def write_ogr(
     file: Path,
     driver: str,
     layer: str,
@@ -309,13 +325,17 @@ def _write_ogr(
     crs: str | None,
     *,
     append: bool,
+    types: Iterable[int] | None = None,
 ) -> None:
+    """Write or append a layer as it is given; a layer of parts names the geometry types of all of them."""
     import pyogrio
     import pyogrio.raw
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
 
-    kinds = [_KINDS.get(int(kind), "Unknown") for kind in np.unique(shapely.get_type_id(geometries))] or ["Polygon"]
-    kind = kinds[0] if len(kinds) == 1 else "Multi" + min(kinds, key=len)
+    # GDAL keeps some beginnings for itself, and takes no sign as the first letter.
+    if driver == "GPKG" and (layer.lower().startswith(("gpkg", "sqlite")) or not layer[:1].isalnum()):
+        layer = f"layer_{layer}"
+    kind = _layer_kind(np.unique(shapely.get_type_id(geometries)) if types is None else types)
     # A GeoPackage stores when it was written; a fixed date makes equal content equal bytes, which scenes rely on.
     pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": "2000-01-01T00:00:00.000Z"})
     try:
@@ -341,6 +361,12 @@ def _write_ogr(
         pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": None})
     if driver == "GeoJSON" and crs is None:
         _say_no_crs(file)
+
+
+def _layer_kind(types: Iterable[int]) -> str:
+    """Return the geometry type of a layer of geometries of some types, as shapely numbers them."""
+    kinds = [_KINDS.get(int(number), "Unknown") for number in types] or ["Polygon"]
+    return kinds[0] if len(kinds) == 1 else "Multi" + min(kinds, key=len)
 
 
 def _say_no_crs(file: Path) -> None:

@@ -1,16 +1,20 @@
 """Tiling: every place has one owner, and the seam pass leaves one footprint for each building."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import shapely
+from harness.effort import examples
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from roofbench.detectors.mpp.mpp_detector import MPP
 from roofbench.detectors.ndsm.ndsm_detector import NDSM
 from roofbench.detectors.registry import DETECTORS
-from roofbench.detectors.tiling import CUT, SPARE, Tile, join_tiles, owned, stream_of, tiles_over
-from roofbench.scenes.geodata.footprints import Footprints
+from roofbench.detectors.seams import join_strips, join_tiles, tile_facts
+from roofbench.detectors.tiling import CUT, SPARE, Tile, owned, stream_of, tiles_over
+from roofbench.scenes.geodata.footprints import Footprints, stacked
 
 WHOLE = (0.0, 0.0, 300.0, 100.0)
 LEFT, MIDDLE, RIGHT = tiles_over(WHOLE, 100.0)
@@ -125,6 +129,54 @@ def test_the_order_of_the_parts_does_not_matter():
     parts = {tile: part(*boxes[n::3]) for n, tile in enumerate((LEFT, MIDDLE, RIGHT))}
     turned = dict(reversed(parts.items()))
     assert joined(parts) == joined(turned)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(5.0, 60.0))
+@examples(20)
+def test_strips_joined_one_by_one_are_those_of_all_tiles_together(seed, size):
+    """Joined together they are where no strip is settled before the last has come."""
+    rng = np.random.default_rng(seed)
+    tiles = tiles_over((0.0, 0.0, 200.0, 600.0), 100.0)
+    parts = {}
+    for tile in tiles:
+        corner = rng.uniform(-30.0, 130.0 - size / 2, (6, 2)) + tile.core[:2]
+        found = Footprints.of([shapely.box(x, y, x + size, y + rng.uniform(5.0, size)) for x, y in corner])
+        columns = {"part_of": np.arange(6) // 2, "note": np.array(["a" * (1 + tile.row)] * 6)}
+        window = (tile.core[0] - 40, tile.core[1] - 40, tile.core[2] + 40, tile.core[3] + 40)
+        parts[tile] = owned(dataclasses.replace(found, attributes=columns), tile, window, (0.0, 0.0, 200.0, 600.0))
+    facts = tile_facts(parts.items())
+    late = facts._replace(lowest=dict.fromkeys(facts.lowest, -np.inf))
+    sets = [list(join_strips(sorted(parts.items()), given_facts, numbers=["part_of"])) for given_facts in (facts, late)]
+    one, together = (stacked([strip for strip, _ in strips]) for strips in sets)
+    assert shapely.to_wkb(one.polygons).tolist() == shapely.to_wkb(together.polygons).tolist()
+    assert one.ids.tolist() == list(range(len(one)))
+    for name in ("part_of", "note"):
+        assert one.attributes[name].tolist() == together.attributes[name].tolist()
+    assert (
+        np.sum([done for _, done in sets[0]], axis=0).tolist() == np.sum([done for _, done in sets[1]], axis=0).tolist()
+    )
+
+
+def test_a_strip_is_complete_before_the_last_one_has_come():
+    parts = [(Tile(row, 0, 100.0), part((10, 100 * row + 10, 30, 100 * row + 90))) for row in range(4)]
+    read = []
+
+    def following():
+        for item in parts:
+            read.append(item[0].row)
+            yield item
+
+    strips = join_strips(following(), tile_facts(parts))
+    first, _ = next(strips)
+    assert len(first) == 1
+    assert read == [0, 1]  # the next row is looked at only to know that the first is complete
+    assert [len(strip) for strip, _ in strips] == [1, 1, 1]
+
+
+def test_an_attribute_that_some_tiles_lack_is_left_out():
+    found, _ = join_tiles({LEFT: part((1, 1, 9, 9), height=[3.0]), RIGHT: part((210, 1, 219, 9))}, crs=None)
+    assert len(found) == 2
+    assert not found.attributes
 
 
 def test_numbers_and_building_ids_stay_unique_over_tiles():

@@ -17,7 +17,8 @@ from builders.town import SOUTH, STREET, WEST, street
 
 from roofbench.benchmark.execution.worker import detect
 from roofbench.detectors.registry import make_detector
-from roofbench.detectors.tiling import CUT, SPARE, join_tiles, measure, owned, stream_of, tiles_over
+from roofbench.detectors.seams import join_tiles
+from roofbench.detectors.tiling import CUT, SPARE, measure, owned, stream_of, tiles_over
 
 TILE = 64.0
 
