@@ -73,7 +73,7 @@ def print_problems(detected: Sequence[Footprints], truth: Truth, *, evaluation_a
     if evaluation_area and not any(reaches(truth.area, footprints) for footprints in every):
         raise InputError(
             f"{evaluation_area} holds none of the footprints, neither detected nor reference: "
-            "check that it shows the same place in the CRS that it names"
+            "check that it shows the same place in the CRS that it names, and the order of its axes"
         )
 
 

@@ -46,6 +46,8 @@ def report_index(folder: Path, found: IndexedFolder) -> None:
     """Print what a folder of tiles holds and which files are left out of it; exit code 3 when there are any."""
     for problem in found.problems:
         say(f"Error: {problem}")
+    for note in found.notes:
+        say(f"note: {note}")
     typer.echo(f"{folder}: scene {found.scene.name!r} with {', '.join(found.scene.contents)}")
     if found.problems:
         raise typer.Exit(3)

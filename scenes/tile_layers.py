@@ -53,6 +53,8 @@ class TileFile:
         Cell size of a raster, metres.
     bands : tuple of str
         Of an image, in the order of the file; ``-`` skips one.
+    depth : int
+        Bits of the values of an image of 16 bit; fewer are scaled to 16.
     """
 
     layer: str
@@ -61,6 +63,7 @@ class TileFile:
     sha256: str
     gsd: float | None = None
     bands: tuple[str, ...] = ()
+    depth: int = 16
 
     def meets(self, extent: _Extent) -> bool:
         """Return whether the file may hold something inside an extent."""
@@ -98,7 +101,8 @@ class TiledLayer:
             return None
         grid, headers = self._grid.cut(*part), [read_raster_header(path) for path in paths]
         if self.layer == "image":
-            return mosaic_image(headers, grid, crs=self.crs, bands=met[0].bands)
+            depths = [file.depth for file in met]
+            return mosaic_image(headers, grid, crs=self.crs, bands=met[0].bands, depths=depths)
         return mosaic_elevation(headers, grid, crs=self.crs)
 
     def digest(self, extent: _Extent) -> str:
@@ -169,6 +173,8 @@ def tile_problem(entries: Any) -> str | None:
         bounds = entry.get("bounds")
         if not isinstance(bounds, list) or len(bounds) != 4 or not np.isfinite(np.array(bounds, dtype=float)).all():
             return f"bounds of {entry['file']} must be [xmin, ymin, xmax, ymax] in metres"
+        if entry.get("depth", 16) not in range(8, 17):
+            return f"depth of {entry['file']} must be a number of bits from 8 to 16"
     return None
 
 

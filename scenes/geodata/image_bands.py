@@ -11,7 +11,15 @@ from ...core.errors import InputError
 from .opened_rasters import opened
 from .raster_headers import RasterHeader
 
-__all__ = ["BANDS", "alpha_of", "assumed_bands", "band_names", "looks_like_values", "require_image_type"]
+__all__ = [
+    "BANDS",
+    "alpha_of",
+    "assumed_bands",
+    "band_names",
+    "looks_like_values",
+    "require_image_type",
+    "sampled_largest",
+]
 
 #: Names that a band can have; any other in ``bands=`` is refused, ``-`` skips one.
 BANDS = ("red", "green", "blue", "nir", "grey")
@@ -121,6 +129,14 @@ def looks_like_values(header: RasterHeader) -> bool:
     limits = (0, 1, np.iinfo(values.dtype).max) if values.dtype.kind == "u" else (0, 1, 255)
     # Soft edges of a mosaic have some values between, and few pixels.
     return len(np.unique(values)) > 8 or float(np.isin(values, limits, invert=True).mean()) > 0.1
+
+
+def sampled_largest(header: RasterHeader, names: Sequence[str]) -> int:
+    """Return the largest value of an image among a million pixels or fewer, where it has data."""
+    indexes = [index for index, name in enumerate(names, start=1) if name != "-"]
+    with opened(header.path, alpha=alpha_of(header, names)) as source:
+        shape = tuple(min(side, 1024) for side in source.shape)
+        return int(source.read(indexes, out_shape=(len(indexes), *shape), masked=True).filled(0).max(initial=0))
 
 
 def require_image_type(header: RasterHeader) -> None:

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError, OutputError
 from ...core.inputs import require_file
-from .colour_depth import stretch_to_16_bit
+from .colour_depth import common_depths, depth_note, scaled_to_16_bit, stretch_to_16_bit
 from .crs import parse_crs
 from .las_headers import (
     HEADER_BYTES,
@@ -150,6 +150,7 @@ def read_points(
     window: tuple[float, float, float, float] | None = None,
     chunks: Mapping[Path, NDArray[np.float64]] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    note: Callable[[str], None] | None = None,
 ) -> PointCloud:
     """Read the points of one or several files, in the order of the files.
 
@@ -163,6 +164,8 @@ def read_points(
         Bounds of the chunks of files (`point_chunks`): a window reads only those that it meets.
     progress : callable, optional
         Called with (points unpacked so far, points in all).
+    note : callable, optional
+        Called with a sentence where colours of 10 to 14 bit are scaled to 16; without it they stay as they are.
 
     Raises
     ------
@@ -184,6 +187,8 @@ def read_points(
         columns.end_file(header)
     if seen and columns.withheld == seen:
         raise InputError(f"{files[0]}: all points are flagged as withheld, which means that they must not be used")
+    if note is not None:
+        columns.scale_colours(note)
     return columns.cloud()
 
 
@@ -235,6 +240,7 @@ class _Columns:
     def __init__(self, total: int, *, colour: bool, nir: bool) -> None:
         self._filled, self._first = 0, 0
         self._outside = 0
+        self._foreign: list[tuple[Path, slice, int]] = []
         self.withheld = 0
         self._x, self._y, self._z = (np.empty(total, dtype=np.float64) for _ in range(3))
         self._small: dict[str, NDArray[Any]] = {
@@ -288,10 +294,25 @@ class _Columns:
                 f"{xmax:.1f}, y {ymin:.1f} to {ymax:.1f}): write the header anew, for instance with lasinfo -repair"
             )
         if self._colour is not None and header.software != _SOFTWARE:
-            part = self._colour[self._first : self._filled]
+            rows = slice(self._first, self._filled)
+            part = self._colour[rows]
+            narrow = int(part.max(initial=0)) <= 255
             for bands in (part[:, :3], part[:, 3:]):  # near infrared may have another depth
                 stretch_to_16_bit(bands)
+            if not narrow:
+                self._foreign.append((header.path, rows, int(part.max(initial=0))))
         self._first = self._filled
+
+    def scale_colours(self, note: Callable[[str], None]) -> None:
+        """Scale colours of files of 10 to 14 bit to 16, and report them."""
+        depths = common_depths([largest for _, _, largest in self._foreign])
+        for depth in sorted(set(depths) - {16}):
+            files = [item for item, own in zip(self._foreign, depths, strict=True) if own == depth]
+            for _, rows, _ in files:
+                assert self._colour is not None
+                self._colour[rows] = scaled_to_16_bit(self._colour[rows], depth)
+            more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+            note(f"{files[0][0].name}{more}: {depth_note(depth)}")
 
     def cloud(self) -> PointCloud:
         """Return the points; columns that no file fills are None."""

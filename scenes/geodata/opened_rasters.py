@@ -52,9 +52,10 @@ def opened(file: Path, *, alpha: bool | None = None) -> Iterator[Any]:
     except (RasterioError, RasterioIOError) as error:  # two kinds before rasterio 1.4
         cause = error.__cause__ or error
         reason = " ".join(str(cause).split())
-        raise InputError(
-            f"{file} cannot be read as a raster ({reason}): copy or download it again, or give a GeoTIFF"
-        ) from error
+        remedy = "copy or download it again, or give a GeoTIFF"
+        if file.suffix.lower() == ".vrt" and "No such file" in reason:
+            remedy = "put the file back that it shows, make it anew without that, or choose an extent beside it"
+        raise InputError(f"{file} cannot be read as a raster ({reason}): {remedy}") from error
 
 
 @contextmanager

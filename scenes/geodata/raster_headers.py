@@ -62,6 +62,8 @@ class RasterHeader:
         Whether a further, last band is marked as alpha. Many programs mark near infrared so.
     mask_band : bool
         Whether a further, last band without a name holds a mask: one value beside 0, the highest or 1.
+    depth : int, optional
+        Bits of each value, where the file names fewer than its type has.
     """
 
     path: Path
@@ -77,6 +79,7 @@ class RasterHeader:
     offset: float
     alpha: bool = False
     mask_band: bool = False
+    depth: int | None = None
 
 
 def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) -> RasterHeader:
@@ -159,6 +162,7 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
             offset=source.offsets[0],
             alpha=count < len(colours) and colours[-1].name == "alpha",
             mask_band=mask_band,
+            depth=_depth(source),
         )
 
 
@@ -172,6 +176,13 @@ def source_crs(file: Path, source: Any) -> str | None:
     except ProjError as error:
         raise CRSError(f"{file}: its CRS cannot be read ({error}): set it with gdal_edit.py -a_srs") from error
     return file_crs(crs)
+
+
+def _depth(source: Any) -> int | None:
+    """Return the bits of a value by GDAL's item NBITS, where all bands name the same number."""
+    found = {str(source.tags(band, ns="IMAGE_STRUCTURE").get("NBITS", "")) for band in range(1, source.count + 1)}
+    text = found.pop() if len(found) == 1 else ""
+    return int(text) if text.isdecimal() and 8 <= int(text) < 16 else None
 
 
 def _height_unit(source: Any) -> str | None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError
+from .colour_depth import UNDOUBTED, scaled_to_16_bit
 from .crs import crs_label, same_crs
 from .image_bands import alpha_of, band_names, require_image_type
 from .opened_rasters import opened
@@ -22,7 +23,15 @@ from .raster import Elevation, Grid, Image
 from .raster_files import data_mask
 from .raster_headers import RasterHeader
 
-__all__ = ["mosaic_elevation", "mosaic_image", "raster_sources", "resampling_note", "warped_extent", "warped_size"]
+__all__ = [
+    "largest_value",
+    "mosaic_elevation",
+    "mosaic_image",
+    "raster_sources",
+    "resampling_note",
+    "warped_extent",
+    "warped_size",
+]
 
 #: Largest mean difference of two images of one place that are copies of each other, as a share of the largest value.
 _SAME_IMAGE = 0.05
@@ -77,12 +86,14 @@ def mosaic_image(
     *,
     crs: str,
     bands: Sequence[str] | None = None,
+    depths: Sequence[int] | None = None,
     note: Callable[[str], None] | None = None,
 ) -> Image:
     """Bring one or several orthoimages to `grid` in `crs`; a file that has no CRS is taken to be in it.
 
     Files whose cells coincide with those of `grid` are copied, others resampled: averaged when their cells are much
-    smaller, else bilinear. A file of which nothing is used, since others cover it, is reported by `note`.
+    smaller, else bilinear. Of `depths` in bits, one for each file, those below 16 are scaled to 16. A file of which
+    nothing is used, since others cover it, is reported by `note`.
 
     Raises
     ------
@@ -107,10 +118,12 @@ def mosaic_image(
             )
     values = np.zeros((len(kept), *grid.shape), dtype=headers[0].dtype)
     valid = np.zeros(grid.shape, dtype=bool)
-    for header, names in zip(headers, named, strict=True):
+    for header, names, depth in zip(headers, named, depths or [16] * len(headers), strict=True):
         indexes = [names.index(name) + 1 for name in kept]
         shared = _Overlap()
         for rows, columns, block, has_data in _warped(header, indexes, grid, crs, alpha=alpha_of(header, names)):
+            if values.dtype == np.uint16:
+                block = scaled_to_16_bit(block, depth)
             fresh = has_data & ~valid[rows, columns]
             shared.add(has_data, has_data & ~fresh, values[:, rows, columns], block)
             values[:, rows, columns][:, fresh] = block[:, fresh]
@@ -124,6 +137,18 @@ def mosaic_image(
         if shared.is_whole and note is not None:
             note(f"{header.path.name} is not used: other images have data in all of its cells")
     return Image(values, kept, grid, None if valid.all() else valid)
+
+
+def largest_value(header: RasterHeader, grid: Grid, *, crs: str, bands: Sequence[str] | None = None) -> int:
+    """Return the largest value of an image where it has data on a grid, or the first that only 16 bit hold."""
+    names = band_names(header, bands)
+    indexes = [index for index, name in enumerate(names, start=1) if name != "-"]
+    largest = 0
+    for _, _, block, has_data in _warped(header, indexes, grid, crs, alpha=alpha_of(header, names)):
+        largest = max(largest, int(block[:, has_data].max(initial=0)))
+        if largest > UNDOUBTED:
+            break
+    return largest
 
 
 def mosaic_elevation(headers: Sequence[RasterHeader], grid: Grid, *, crs: str) -> Elevation:

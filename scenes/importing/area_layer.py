@@ -22,7 +22,7 @@ def read_area(place: Place, name: str) -> shapely.Geometry:
     if not len(parts):
         raise InputError(
             f"{name} does not overlap the scene, {extent_text(place.extent)}: "
-            "check that it shows the same place in the CRS that it names"
+            "check that it shows the same place in the CRS that it names, and the order of its axes"
         )
     return shapely.union_all(parts)
 

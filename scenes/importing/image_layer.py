@@ -11,14 +11,25 @@ from ..geodata.points import PointCloud
 from ..geodata.raster import Image
 from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_image
+from .image_depth import image_depths
+from .infrared_layer import with_infrared
 from .place import Place, extent_text, file_names, file_paths
 from .raster_layer import check_size, grid_of, note_resampling
 
 __all__ = ["image_of", "image_of_points"]
 
 
-def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, bands: Sequence[str] | None) -> Image:
-    """Return the mosaic of orthoimages on the cells of the first, or on cells of `gsd` metres."""
+def image_of(
+    place: Place,
+    images: Sequence[RasterHeader],
+    gsd: float | None,
+    bands: Sequence[str] | None,
+    infrared: Sequence[RasterHeader] = (),
+) -> Image:
+    """Return the mosaic of orthoimages on the cells of the first, or on cells of `gsd` metres.
+
+    Near infrared of files of its own, if there is any, becomes a further band.
+    """
     grid = grid_of(place, images[0], gsd)
     check_size(place, grid.gsd, "gsd")
     note_resampling(place, images, grid)
@@ -26,7 +37,8 @@ def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, ba
         sentence = assumed_bands(header, bands)
         if sentence:
             place.log.note(sentence)
-    image = mosaic_image(images, grid, crs=place.crs, bands=bands, note=place.log.note)
+    depths, infrared_depths = image_depths(place, images, infrared, grid, bands)
+    image = mosaic_image(images, grid, crs=place.crs, bands=bands, depths=depths, note=place.log.note)
     if bands is None and (marked := [header.path for header in images if looks_like_values(header)]):
         place.log.note(
             f"{file_names(marked)}: the last band is marked as alpha and was taken for the mask, but holds many "
@@ -42,7 +54,8 @@ def image_of(place: Place, images: Sequence[RasterHeader], gsd: float | None, ba
             f"{file_paths([header.path for header in images])} has no data in {extent_text(place.extent)}: image and "
             "points do not overlap"
         )
-    return _with_gaps_noted(place, image)
+    image = _with_gaps_noted(place, image)
+    return with_infrared(place, image, infrared, infrared_depths) if infrared else image
 
 
 def image_of_points(place: Place, points: PointCloud, gsd: float | None, files: Sequence[Path]) -> Image:

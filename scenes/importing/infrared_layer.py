@@ -21,8 +21,12 @@ _FEWEST_VALUES = 8
 _MOST_EQUAL = 0.99
 
 
-def with_infrared(place: Place, image: Image, infrared: Sequence[RasterHeader]) -> Image:
+def with_infrared(
+    place: Place, image: Image, infrared: Sequence[RasterHeader], depths: Sequence[int] | None = None
+) -> Image:
     """Return an image with near infrared as a further band, on the cells of the image.
+
+    `depths` are the bits of the values of each file; those below 16 are scaled to 16.
 
     Raises
     ------
@@ -50,7 +54,7 @@ def with_infrared(place: Place, image: Image, infrared: Sequence[RasterHeader]) 
                 "for instance with gdal_translate -ot"
             )
     note_resampling(place, infrared, image.grid)
-    band = mosaic_image(infrared, image.grid, crs=place.crs, bands=("nir",))
+    band = mosaic_image(infrared, image.grid, crs=place.crs, bands=("nir",), depths=depths)
     valid = np.ones(image.grid.shape, dtype=bool) if image.valid is None else image.valid
     both = valid if band.valid is None else valid & band.valid
     if not both.any():

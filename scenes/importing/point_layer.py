@@ -16,7 +16,7 @@ __all__ = ["points_of"]
 
 def points_of(place: Place, clouds: Sequence[LasHeader], progress: Callable[[int, int], None] | None) -> PointCloud:
     """Return the points of all files in the place, without noise and repeats."""
-    cloud = read_points([header.path for header in clouds], window=place.extent, progress=progress)
+    cloud = read_points([header.path for header in clouds], window=place.extent, progress=progress, note=place.log.note)
     names = file_paths([header.path for header in clouds])
     if len(cloud) == 0:
         raise InputError(f"{names} has no points in {extent_text(place.extent)}: choose another extent=")

@@ -35,7 +35,8 @@ def read_reference(place: Place, name: str, building_id: str | None) -> Footprin
     if not inside.any():
         raise InputError(
             f"{name} covers {extent_text(shapely.total_bounds(footprints.polygons))} and lies outside the scene, "
-            f"{extent_text(place.extent)}: check that it shows the same place in the CRS that it names"
+            f"{extent_text(place.extent)}: check that it shows the same place in the CRS that it names, "
+            "and the order of its axes"
         )
     if not inside.all():
         place.log.note(f"{file}: {np.count_nonzero(~inside)} of {len(inside)} footprints lie outside and were left out")

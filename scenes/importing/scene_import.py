@@ -29,7 +29,6 @@ from ..scene import Scene
 from .area_layer import area_of_extent, read_area
 from .dem_layer import dem_of, dem_of_points
 from .image_layer import image_of, image_of_points
-from .infrared_layer import with_infrared
 from .place import ImportLog, Place
 from .placing import assign_crs, decide_place
 from .point_layer import points_of
@@ -140,8 +139,7 @@ def _image(request: ImportRequest, place: Place, headers: _Headers, cloud: Point
         return image_of_points(place, cloud, request.gsd, request.point_files)
     if not headers.images:
         return None
-    image = image_of(place, headers.images, request.gsd, request.bands)
-    return with_infrared(place, image, headers.infrared) if headers.infrared else image
+    return image_of(place, headers.images, request.gsd, request.bands, headers.infrared)
 
 
 def _dem(request: ImportRequest, place: Place, headers: _Headers, cloud: PointCloud | None) -> Elevation | None:

@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import CRSError, InputError, RoofbenchError
+from ...core.wording import counted
 from ..folder import FILES, MANIFEST, open_scene, read_manifest, write_manifest
+from ..geodata.colour_depth import common_depths, depth_note
 from ..geodata.crs import crs_label, named_crs, require_metric, same_crs
-from ..geodata.image_bands import band_names
+from ..geodata.image_bands import band_names, sampled_largest
 from ..geodata.las_files import read_chunks, read_las_header
 from ..geodata.point_chunks import read_chunk_index, write_chunk_index
 from ..geodata.raster import Grid
@@ -40,18 +42,23 @@ _LARGE = 200_000
 
 
 class IndexedFolder(NamedTuple):
-    """A scene of tiles, and one sentence for each file that is no part of it."""
+    """A scene of tiles, one sentence for each file that is no part of it, and notes on what was assumed."""
 
     scene: Scene
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 class _Tile(NamedTuple):
-    """An entry of the manifest, the CRS that the file names, and the grid of a raster."""
+    """An entry of the manifest, the CRS that the file names, and what a raster says of itself."""
 
     entry: dict[str, Any]
     crs: str | None
-    grid: Grid | None
+    raster: RasterHeader | None
+
+    @property
+    def grid(self) -> Grid | None:
+        return None if self.raster is None else self.raster.grid
 
 
 def index_folder(
@@ -128,10 +135,11 @@ def index_folder(
     }
     if listed:
         manifest["files"] = listed
+    notes = _add_depths(sound)
     manifest["tiles"] = [tile.entry for tile in sound]
     write_chunk_index(home, chunks)
     write_manifest(home, manifest)
-    return IndexedFolder(open_scene(home), tuple(problems))
+    return IndexedFolder(open_scene(home), tuple(problems), notes)
 
 
 def _files(home: Path, manifest: dict[str, Any]) -> list[Path]:
@@ -161,7 +169,7 @@ def _tile(home: Path, file: Path, crs: str | None) -> _Tile:
     else:
         _require_heights(raster)
     entry["sha256"] = checksum(file)
-    return _Tile(entry, raster.crs, raster.grid)
+    return _Tile(entry, raster.crs, raster)
 
 
 def _add_chunks(
@@ -174,6 +182,26 @@ def _add_chunks(
     found = read_chunks(file) if found is None else found
     if found is not None:
         chunks[entry["sha256"]] = found
+
+
+def _add_depths(tiles: Sequence[_Tile]) -> tuple[str, ...]:
+    """Add the bits of the values of images of 16 bit to their entries, and return a note where they are fewer."""
+    images = [tile for tile in tiles if tile.raster is not None and tile.raster.dtype == "uint16"]
+    images = [tile for tile in images if tile.entry["layer"] == "image"]
+    depths = dict.fromkeys((tile.entry["file"] for tile in images), 16)
+    unnamed = []
+    for tile in images:
+        assert tile.raster is not None
+        if tile.raster.depth is None:
+            unnamed.append((tile.entry["file"], sampled_largest(tile.raster, tile.entry["bands"])))
+        else:
+            depths[tile.entry["file"]] = tile.raster.depth
+    depths |= zip((file for file, _ in unnamed), common_depths([value for _, value in unnamed]), strict=True)
+    for tile in images:
+        if depths[tile.entry["file"]] < 16:
+            tile.entry["depth"] = depths[tile.entry["file"]]
+    found = sorted(set(depths.values()) - {16})
+    return tuple(f"{counted(list(depths.values()).count(depth), 'image')}: {depth_note(depth)}" for depth in found)
 
 
 def _require_heights(raster: RasterHeader) -> None:

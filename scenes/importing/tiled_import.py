@@ -80,7 +80,7 @@ def import_tiles(
             facts["notes"] = log.notes
         # Once more, with the vectors; the files that were read are known.
         found = index_folder(folder, crs=request.crs, name=name, facts=facts)
-    return IndexedFolder(open_scene(output), found.problems)
+    return IndexedFolder(open_scene(output), found.problems, found.notes)
 
 
 def _require_kind(layer: str, file: Path) -> None:
