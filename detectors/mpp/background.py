@@ -37,6 +37,8 @@ _ROOF_OPENNESS = (0.70, 0.12, 0.07, 0.04, 0.03, 0.02, 0.01, 0.01)
 _CROWN_OPENNESS = (0.22, 0.10, 0.10, 0.10, 0.10, 0.12, 0.12, 0.14)
 #: Pseudo-counts of each class: cells at least, and share of the cells.
 _PSEUDO_CELLS, _PSEUDO_SHARE = 200.0, 0.1
+#: Nats in favour of a roof where openness is not known: roughness alone takes half of an old town for crowns.
+_WITHOUT_OPENNESS = 0.25
 #: Steps of the EM, and range of the spread of the logarithm of roughness.
 _STEPS = 20
 _NARROW, _WIDE = 0.4, 1.0
@@ -113,8 +115,11 @@ def tally_textures(
     return tally, bins
 
 
-def estimate_background(tally: Integers, cell: float) -> Background:
-    """Estimate the classes of a scene from what `tally_textures` counted in it, in cells of so many metres."""
+def estimate_background(tally: Integers, cell: float, *, openness: bool = True) -> Background:
+    """Estimate the classes of a scene from what `tally_textures` counted in it, in cells of so many metres.
+
+    Without openness, textures are rated by their roughness alone, from a prior in favour of roofs.
+    """
     counts = tally[:, 0].astype(np.float64).reshape(ROUGHNESS_BINS, OPENNESS_BINS)
     logs = LOG_LOW + (np.arange(ROUGHNESS_BINS) + 0.5) * (LOG_HIGH - LOG_LOW) / ROUGHNESS_BINS
     size_of_sample = int(counts.sum())
@@ -124,7 +129,8 @@ def estimate_background(tally: Integers, cell: float) -> Background:
         (wider * _ROOF_ROUGHNESS[0], _ROOF_ROUGHNESS[1]),
         (math.sqrt(wider) * _CROWN_ROUGHNESS[0], _CROWN_ROUGHNESS[1]),
     )
-    openness_before = np.array(_ROOF_OPENNESS), np.array(_CROWN_OPENNESS)
+    # The same in both classes, openness cancels out.
+    openness_before = np.array(_ROOF_OPENNESS), np.array(_CROWN_OPENNESS if openness else _ROOF_OPENNESS)
     means, spreads = [math.log(centre) for centre, _ in before], [width for _, width in before]
     opens = list(openness_before)
     share = 0.5
@@ -140,11 +146,12 @@ def estimate_background(tally: Integers, cell: float) -> Background:
             means[k] = float((by_roughness @ logs + pseudo * math.log(centre)) / size)
             scatter = by_roughness @ (logs - means[k]) ** 2 + pseudo * (width**2 + (math.log(centre) - means[k]) ** 2)
             spreads[k] = float(np.clip(math.sqrt(scatter / size), _NARROW, _WIDE))
-            opens[k] = (weight.sum(axis=0) + pseudo * openness_before[k]) / size
+            if openness:
+                opens[k] = (weight.sum(axis=0) + pseudo * openness_before[k]) / size
         in_crowns = (counts * belongs).sum() + _SHARE_CELLS
         share = float(np.clip(in_crowns / (size_of_sample + 2 * _SHARE_CELLS), _FEWEST_CROWNS, _MOST_CROWNS))
     likelihoods = _log_likelihoods(logs, means, spreads, opens)
-    evidence = likelihoods[0] - likelihoods[1]
+    evidence = likelihoods[0] - likelihoods[1] + (0.0 if openness else _WITHOUT_OPENNESS)
     # A smoother window is never less likely to be a roof: the tail of the narrower class must not reverse the ratio.
     evidence = np.minimum.accumulate(evidence, axis=0)
     evidence = np.minimum.accumulate(evidence, axis=1)

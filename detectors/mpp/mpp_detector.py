@@ -20,6 +20,7 @@ from ...core.errors import ParameterError
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.scene import Scene
 from ..base import Detector
+from ..shared.cue_information import PENETRATION
 from ..steps import Step
 from .annealing import join_traces
 from .arrays import Mask, Rectangles
@@ -37,6 +38,9 @@ from .threads import started_threads
 from .whole_scene import find_rectangles, total_energy
 
 __all__ = ["MPP"]
+
+#: Share of the least evidence of a building where roughness is the only cue of the points: one cue gives less evidence than two.
+_LEAST_OF_ONE_CUE = 0.8
 
 #: Parameters of earlier versions, and what to do instead.
 _REMOVED = {
@@ -108,6 +112,8 @@ class MPP(MPPParameters, Detector):
         Textures of neighbours resemble each other, so that the best of many windows in a crown sums up to a roof.
         """
         least = self.least_evidence * self.texture_limit * min(self.texture_weight, 1.0)
+        if PENETRATION not in prepared.cues.used:
+            least *= _LEAST_OF_ONE_CUE
         if least == 0:
             return np.ones(len(rectangles), dtype=np.bool_)
         evidence = mean_evidence(

@@ -17,7 +17,7 @@ from ...core.errors import ParameterError
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
-from ..shared.cue_information import CueInformation
+from ..shared.cue_information import PENETRATION, CueInformation
 from .arrays import Heights, Integers, Mask, Rectangles, Scores, States
 from .background import Background, estimate_background, tally_textures
 from .candidates import Boxes, propose_boxes
@@ -159,7 +159,7 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
         cells = make_cells(replace(points, number_of_returns=None), ground, grid, low=low, threads=threads)
         counted, bins = tally_textures(cells, threads=threads)
         tally = _of_whole(scene, _SINGLE_TALLY, counted)
-    background = estimate_background(tally, cell)
+    background = estimate_background(tally, cell, openness=PENETRATION in cues.used)
     weights = weights_of(parameters)
     fitted = fitted_cells(cells, bins, background, weights, threads=threads)
     if parameters.carried_share <= 1:

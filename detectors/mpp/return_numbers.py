@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from ...scenes.geodata.points import PointCloud
-from ..shared.cue_information import ANCHOR, CueInformation
+from ..shared.cue_information import ANCHOR, PENETRATION, CueInformation, silent_on_rasters
 from .arrays import Integers
 from .textures import LOG_HIGH, LOG_LOW, OPENNESS_BINS, ROUGHNESS_BINS
 
@@ -32,14 +32,15 @@ def cues_of(points: PointCloud, counts: Integers) -> CueInformation:
     counts : ndarray of int64, shape (192,)
         Number of cells of each bin (`textures`), of the whole scene.
     """
-    used = (ANCHOR, "penetration")
+    silent = silent_on_rasters(points.x, points.y)
+    used = (ANCHOR,) if silent else (ANCHOR, PENETRATION)
     returns = points.number_of_returns
     if returns is None or not (returns > 1).any():
-        return CueInformation(used, {})
+        return CueInformation(used, silent)
     counts = counts.reshape(ROUGHNESS_BINS, OPENNESS_BINS)
     last = math.ceil((math.log(_SMOOTH) - LOG_LOW) / (LOG_HIGH - LOG_LOW) * ROUGHNESS_BINS)
     smooth, opened = counts[:last].sum(), counts[:last, OPENNESS_BINS // 2 :].sum()
     if smooth >= _FEWEST and opened > _MOST_OPEN * smooth:
         reason = f"{opened / smooth:.0%} of the smooth surfaces have it, too"
-        return CueInformation(used, {MULTIPLE: reason})
-    return CueInformation((*used, MULTIPLE), {})
+        return CueInformation(used, {**silent, MULTIPLE: reason})
+    return CueInformation((*used, MULTIPLE), silent)

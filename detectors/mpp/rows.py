@@ -7,9 +7,9 @@ part
 block
     All that is built together (`blocks`).
 row
-    A block with at least `_CERTAIN_WALLS` certain party walls, or a long and narrow one with `_WALLS_OF_LONG`, of which
-    one part has `_REPEATED`: houses of a row repeat under one line of roofs, while the wings of one building have a
-    step each. Its parts are cut at their probable party walls, and each piece is a house of its own unless smaller than
+    A block at least `_SHORTEST` metres long with at least `_CERTAIN_WALLS` certain party walls, or a long and narrow
+    one with `_WALLS_OF_LONG`, of which one part has `_REPEATED`: houses of a row repeat under one line of roofs, while
+    the wings of one building have a step each. Its parts are cut at their probable party walls, and each piece is a house of its own unless smaller than
     `_ANNEX`.
 building
     A block that is no row with all its parts, or a house of a row with its annexes. A part outside all blocks is a
@@ -39,6 +39,8 @@ _CERTAIN_WALLS, _WALLS_OF_LONG = 3, 2
 #: Certain party walls that one part of a row has at least.
 _REPEATED = 2
 _LONG, _SLENDER = 25.0, 2.0
+#: Metres: shortest row. Villas of two or three wings have as many steps and valleys, but are shorter.
+_SHORTEST = 22.5
 #: Square metres: smaller pieces of a row belong to the house that they touch most; the smallest piece that is one.
 _ANNEX, _PIECE = 15.0, 8.0
 #: Metres: pieces so close touch, and by how much outlines are closed when they are joined.
@@ -154,8 +156,8 @@ def _are_rows(blocks: NDArray[np.object_], walls: NDArray[Any]) -> NDArray[np.bo
     corners = shapely.get_coordinates(shapely.oriented_envelope(blocks)).reshape(-1, 5, 2)
     sides = np.sort(np.hypot(*(corners[:, 1:3] - corners[:, :2]).transpose(2, 0, 1)), axis=1)
     slender = (sides[:, 1] >= _LONG) & (sides[:, 1] >= _SLENDER * sides[:, 0])
-    rows: NDArray[np.bool_] = walls >= np.where(slender, _WALLS_OF_LONG, _CERTAIN_WALLS)
-    return rows
+    enough = walls >= np.where(slender, _WALLS_OF_LONG, _CERTAIN_WALLS)
+    return np.asarray(enough & (sides[:, 1] >= _SHORTEST))
 
 
 def _objects(polygons: list[Any]) -> NDArray[np.object_]:

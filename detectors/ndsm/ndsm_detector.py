@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ...core.conditions import GIVEN, Uses
 from ...core.parameters import parameter
-from ...scenes.geodata.density import is_lattice, point_spacing
+from ...scenes.geodata.density import point_spacing
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.outlines import coverage_of_mask, minimum_rectangles, trace
 from ...scenes.geodata.points import PointCloud
@@ -31,7 +31,7 @@ from ...scenes.geodata.raster import Grid
 from ...scenes.ground.heights import Heights, heights_of
 from ...scenes.scene import Scene
 from ..base import Detector
-from ..shared.cue_information import ANCHOR, CueInformation, informative_cues
+from ..shared.cue_information import ANCHOR, PENETRATION, CueInformation, informative_cues, silent_on_rasters
 from ..shared.cues import CellCues, cell_cues, greenness
 from ..shared.morphology import opened, without_holes
 from ..shared.regularise import regularise
@@ -47,8 +47,6 @@ _Mask = NDArray[np.bool_]
 #: Name of the cue from the image, and its weight against 1 for each cue from the points: roofs may be green, trees in
 #: autumn are not, and roofs are displaced in the image.
 _IMAGE, _IMAGE_WEIGHT = "image vegetation", 0.5
-#: Name of the cue that a raster cannot give: it has one height a cell.
-_PENETRATION = "penetration"
 #: Noise of heights, metres, that the threshold of roughness allows for; image matching may have more.
 _LASER_NOISE = 0.12
 #: The thresholds of the cues, each of which may be none.
@@ -202,9 +200,7 @@ class NDSM(Detector):
     def _known_silent(self, points: PointCloud, grid: Grid) -> dict[str, str]:
         """Return why a cue cannot carry information: penetration of a raster fine enough for roughness to do alone."""
         fine = 2 * grid.gsd <= self.window and self.roughness is not None
-        if fine and self.penetration is not None and is_lattice(points.x, points.y):
-            return {_PENETRATION: "the points are cells of a raster, nothing is seen below them"}
-        return {}
+        return silent_on_rasters(points.x, points.y) if fine and self.penetration is not None else {}
 
     def _cue_likeness(self, cues: CellCues, vegetation: tuple[_Floats, float] | None) -> dict[str, _Floats]:
         """Return the rating of each cell by each cue: -1 roof, 0 at its threshold, +1 tree, NaN unknown."""
@@ -212,7 +208,7 @@ class NDSM(Detector):
         rules = {
             "multiple returns": (cues.multiple_share, self.multiple_share, 0.25),
             ANCHOR: (cues.roughness, self._roughest_roof(cues.noise), 0.2),
-            _PENETRATION: (cues.penetration, self.penetration, 0.15),
+            PENETRATION: (cues.penetration, self.penetration, 0.15),
             _IMAGE: (index, least_index, 0.05),
         }
         return {

@@ -25,16 +25,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ANCHOR", "CueInformation", "informative_cues"]
+from ...scenes.geodata.density import is_lattice
+
+__all__ = ["ANCHOR", "PENETRATION", "CueInformation", "informative_cues", "silent_on_rasters"]
 
 _Floats = NDArray[np.float32]
 
 _NONE: Mapping[str, str] = {}
-#: Name of the cue that is never silent.
-ANCHOR = "roughness"
+#: Names of the cue that is never silent and of the other one from coordinates.
+ANCHOR, PENETRATION = "roughness", "penetration"
 #: Cues from coordinates, which are silent only where they are constant, and the share of cells within `_CONSTANT` of
 #: the median rating from which they are.
-_GEOMETRIC = frozenset({ANCHOR, "penetration"})
+_GEOMETRIC = frozenset({ANCHOR, PENETRATION})
 _CONSTANT_SHARE, _CONSTANT = 0.98, 0.1
 #: Least separation. Measured on five airborne clouds with and without their return numbers, and rastered: cues that
 #: help reach 0.33 to 1.8, those that mislead 0.2 at most.
@@ -61,6 +63,11 @@ class CueInformation:
     def notes(self) -> tuple[str, ...]:
         """One sentence for each silent cue."""
         return tuple(f"the cue {name!r} is not used: {reason}" for name, reason in self.silent.items())
+
+
+def silent_on_rasters(x: NDArray[np.float64], y: NDArray[np.float64]) -> dict[str, str]:
+    """Return the cues that points on a lattice cannot have, with the reason; empty for other points."""
+    return {PENETRATION: "the points are cells of a raster, nothing is seen below them"} if is_lattice(x, y) else {}
 
 
 def informative_cues(

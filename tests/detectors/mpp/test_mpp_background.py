@@ -8,6 +8,7 @@ from roofbench.detectors.mpp.background import Background, estimate_background, 
 from roofbench.detectors.mpp.cells import HIGH, LOW, VOID, Cells, cell_size
 from roofbench.detectors.mpp.rectangles import inside_any
 from roofbench.detectors.mpp.scores import Weights, fitted_cells, mean_evidence, restrain
+from roofbench.detectors.mpp.textures import OPENNESS_BINS, ROUGHNESS_BINS
 from roofbench.detectors.mpp.threads import started_threads
 from roofbench.scenes.geodata.raster import Grid
 
@@ -33,6 +34,16 @@ def test_a_score_of_a_high_cell_is_at_most_the_mean_around_it(reach):
         restrain(score, state, reach, first, last, found)
     np.testing.assert_array_equal(found, naive.restrained(score, state == HIGH, reach))
     assert (found < score).any()
+
+
+def test_without_openness_textures_are_rated_by_roughness_alone():
+    counts = np.zeros((ROUGHNESS_BINS, OPENNESS_BINS), dtype=np.int64)
+    counts[4:8, 0], counts[14:18, :] = 900, 100
+    tally = np.stack([counts.ravel(), 600 * counts.ravel(), 360_000 * counts.ravel()], axis=1)
+    both, alone = (np.array(estimate_background(tally, 0.5, openness=known).evidence) for known in (True, False))
+    assert np.ptp(both, axis=1).max() > 1
+    np.testing.assert_allclose(np.ptp(alone, axis=1), 0, atol=1e-12)
+    assert alone[5, 0] > 0 > alone[16, 0]
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7])

@@ -4,6 +4,7 @@ import numpy as np
 
 from roofbench.detectors.mpp.return_numbers import MULTIPLE, cues_of
 from roofbench.detectors.mpp.textures import OPENNESS_BINS, ROUGHNESS_BINS
+from roofbench.detectors.shared.cue_information import PENETRATION
 from roofbench.scenes.geodata.points import PointCloud
 
 SMOOTH, ROUGH = 5 * OPENNESS_BINS, 18 * OPENNESS_BINS
@@ -36,6 +37,15 @@ def test_two_returns_of_every_pulse_are_not_read():
 
 def test_a_wood_without_smooth_surfaces_proves_nothing():
     assert MULTIPLE in cues_of(points([1, 2]), counts((SMOOTH + OPEN, 30), (ROUGH + OPEN, 5000))).used
+
+
+def test_cells_of_a_raster_do_not_show_what_is_below_a_crown():
+    x, y = (values.ravel() for values in np.meshgrid(np.arange(0.25, 20, 0.5), np.arange(0.25, 20, 0.5)))
+    raster, scattered = PointCloud(x, y, 0 * x), PointCloud(x + 0.1 * np.sin(y), y, 0 * x)
+    found = cues_of(raster, counts((SMOOTH, 300)))
+    assert PENETRATION not in found.used
+    assert "raster" in found.notes[0]
+    assert PENETRATION in cues_of(scattered, counts((SMOOTH, 300))).used
 
 
 def test_points_without_multiple_returns_do_not_hold_the_cue():

@@ -208,7 +208,7 @@ def test_a_house_with_a_wing_is_one_building_and_a_part_outside_blocks_another()
     assert sorted(alone.block_of_building) == [0, 1]
 
 
-@pytest.mark.parametrize(("houses", "length", "buildings"), [(3, 30, 3), (3, 22, 1), (4, 24, 4)])
+@pytest.mark.parametrize(("houses", "length", "buildings"), [(3, 30, 3), (3, 22, 1), (4, 24, 4), (4, 22, 1)])
 def test_a_long_row_needs_fewer_walls_than_a_short_block(houses, length, buildings):
     sides = (10, 10, 10 + length, 20)
     found, _ = levels([(sides, steps(length / houses, 10.0, 0.6))], [rectangle(*sides)])
