@@ -39,7 +39,7 @@ from .whole_scene import find_rectangles, total_energy
 
 __all__ = ["MPP"]
 
-#: Share of the least evidence of a building where roughness is the only cue of the points: one cue gives less evidence than two.
+#: Share of the least evidence of a building where roughness is the only cue of the points: one cue gives less than two.
 _LEAST_OF_ONE_CUE = 0.8
 
 #: Parameters of earlier versions, and what to do instead.

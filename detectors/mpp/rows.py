@@ -7,10 +7,10 @@ part
 block
     All that is built together (`blocks`).
 row
-    A block at least `_SHORTEST` metres long with at least `_CERTAIN_WALLS` certain party walls, or a long and narrow
-    one with `_WALLS_OF_LONG`, of which one part has `_REPEATED`: houses of a row repeat under one line of roofs, while
-    the wings of one building have a step each. Its parts are cut at their probable party walls, and each piece is a house of its own unless smaller than
-    `_ANNEX`.
+    A block at least `_SHORTEST` metres long with at least `_CERTAIN_WALLS` certain party walls, or a long and
+    narrow one with `_WALLS_OF_LONG`, of which one part has `_REPEATED`: houses of a row repeat under one line of
+    roofs, while the wings of one building have a step each. Its parts are cut at their probable party walls, and
+    each piece is a house of its own unless smaller than `_ANNEX`.
 building
     A block that is no row with all its parts, or a house of a row with its annexes. A part outside all blocks is a
     building, too.
