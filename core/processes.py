@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ THREAD_LIMITS = {
     "NUMEXPR_NUM_THREADS": "1",
     "VECLIB_MAXIMUM_THREADS": "1",
 }
+_PATIENCE = 5.0  # seconds for killed processes to end
 #: Variables that say where and by which command line this process was started.
 _TRACES = ("PWD", "OLDPWD", "_", "PYTEST_CURRENT_TEST")
 
@@ -98,11 +100,16 @@ def end_tree(process: int) -> None:
 
 
 def end_children() -> None:
-    """Kill every descendant of this process."""
+    """Kill every descendant of this process, and wait for its children, whose processor time then counts as its own."""
     import psutil
 
     with suppress(psutil.Error):
         _kill(psutil.Process().children(recursive=True))
+    deadline = time.monotonic() + _PATIENCE
+    with suppress(OSError):  # there are no more children; a system that cannot wait for any
+        while time.monotonic() < deadline:
+            if os.waitpid(-1, getattr(os, "WNOHANG", 0))[0] == 0:
+                time.sleep(0.01)
 
 
 def _kill(processes: list[object]) -> None:

@@ -1,10 +1,13 @@
-"""The detector process as the process that opens scenes and evaluates sees it; see `detection`."""
+"""The detector processes as the process that opens scenes and evaluates sees them; see `detection`.
+
+Detectors of roofbench share one process. A plugin runs in another one, which has run no other plugin, so that no plugin
+can change what another detector finds.
+"""
 
 from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,15 +22,17 @@ from numpy.typing import NDArray
 from ...core.errors import MissingInputError
 from ...core.processes import death_reason, end_tree, start_python
 from ...detectors.base import Declaration
+from ...detectors.registry import DETECTORS
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.polygon_repair import Repair
 from ...scenes.scene import Scene
 from ..identity.recipes import PluginRecipe
 from ..identity.spool import measured_arrays
 from ..store.outcomes import Cost
+from .fork_server import ForkedProcess, ForkServer
 from .messages import receive_parts, send_parts
 
-__all__ = ["DetectionFailedError", "DetectorProcess"]
+__all__ = ["DetectionFailedError", "DetectorProcess", "DetectorProcesses"]
 
 _START = f"from {__package__}.detection import serve_detectors; serve_detectors()"
 _PATIENCE = 5.0  # seconds for a process that closed its streams to end
@@ -41,21 +46,53 @@ class DetectionFailedError(Exception):
         self.trace, self.cost, self.process_ended = trace, cost, process_ended
 
 
+class _StartedProcess:
+    """A detector process that is a new interpreter; see `ForkedProcess`, which it can replace."""
+
+    def __init__(self, folder: str, errors: int | None) -> None:
+        path = os.pathsep.join(entry for entry in sys.path if entry)
+        self._process = start_python(_START, path=path, folder=folder, errors=errors)
+        self.pid, self.stdin, self.stdout = self._process.pid, self._process.stdin, self._process.stdout
+
+    def ended(self) -> tuple[int | None, int]:
+        """Return the exit code of a process that closed its streams and its highest memory; None while it runs."""
+        deadline = time.monotonic() + _PATIENCE
+        while time.monotonic() < deadline:
+            if not hasattr(os, "wait4"):
+                return self._process.poll(), 0
+            number, status, usage = os.wait4(self.pid, os.WNOHANG)
+            if number:
+                self._process.returncode = os.waitstatus_to_exitcode(status)
+                return self._process.returncode, usage.ru_maxrss * 1024
+            time.sleep(0.01)
+        return None, 0
+
+    def end(self) -> None:
+        """Kill it with the programs that it runs, and wait for it."""
+        end_tree(self.pid)
+        with suppress(OSError):
+            self._process.kill()
+        self._process.wait()
+
+
 class DetectorProcess:
     """One detector process, started by the first request, and anew after it ended.
 
     Parameters
     ----------
+    server : ForkServer, optional
+        What forks it; by default it is a new interpreter.
     errors : int, optional
         Descriptor of its standard error, by default that of this process.
     place : str, optional
         Folder for its working folder, by default that of temporary files.
     """
 
-    def __init__(self, errors: int | None = None, place: str | None = None) -> None:
+    def __init__(self, server: ForkServer | None = None, errors: int | None = None, place: str | None = None) -> None:
+        self._server = server
         self._errors = errors
         self._place = place
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: ForkedProcess | _StartedProcess | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._scene: Scene | None = None
         self._declared: dict[str, Declaration] = {}
@@ -102,10 +139,7 @@ class DetectorProcess:
         self._declared.clear()
         if process is None:
             return
-        end_tree(process.pid)
-        with suppress(OSError):
-            process.kill()
-        process.wait()
+        process.end()
         for stream in (process.stdin, process.stdout):
             with suppress(OSError):
                 if stream is not None:
@@ -122,7 +156,7 @@ class DetectorProcess:
             send_parts(process.stdin, request, arrays)
             answer, parts = receive_parts(output)
         except (EOFError, OSError, ValueError):  # ValueError: nonsense, or a closed stream
-            code, peak = _ended(process)
+            code, peak = process.ended()
             cost = Cost(seconds=time.perf_counter() - started, peak_memory=peak)
             self.close()
             reason = death_reason(code, "the worker process")
@@ -143,12 +177,37 @@ class DetectorProcess:
         except (OSError, AttributeError):  # a terminal or a pipe; a system without pread
             return ""
 
-    def _running(self) -> subprocess.Popen[bytes]:
+    def _running(self) -> ForkedProcess | _StartedProcess:
         if self._process is None:
             self._folder = tempfile.TemporaryDirectory(prefix="roofbench-", dir=self._place, ignore_cleanup_errors=True)
-            path = os.pathsep.join(entry for entry in sys.path if entry)
-            self._process = start_python(_START, path=path, folder=self._folder.name, errors=self._errors)
+            if self._server is None:
+                self._process = _StartedProcess(self._folder.name, self._errors)
+            else:
+                self._process = self._server.fork(self._folder.name)
         return self._process
+
+
+class DetectorProcesses:
+    """One process for the detectors of roofbench, and one for the plugin that ran last.
+
+    Parameters
+    ----------
+    server, errors, place : optional
+        Of each process; see `DetectorProcess`.
+    """
+
+    def __init__(self, server: ForkServer | None = None, errors: int | None = None, place: str | None = None) -> None:
+        self._built_in, self._plugin = (DetectorProcess(server, errors, place) for _ in range(2))
+        self._latest = ""
+
+    def of(self, recipe: PluginRecipe) -> DetectorProcess:
+        """Return the process of a detector; that of another plugin is ended."""
+        if DETECTORS.is_builtin(recipe.use):
+            return self._built_in
+        if recipe.use != self._latest:
+            self._plugin.close()
+            self._latest = recipe.use
+        return self._plugin
 
 
 def _request(recipe: PluginRecipe) -> dict[str, Any]:
@@ -177,17 +236,3 @@ def _received(answer: Mapping[str, Any], parts: list[NDArray[Any]]) -> tuple[Foo
 
 def _column(given: int | list[Any], parts: list[NDArray[Any]]) -> NDArray[Any]:
     return parts[given] if isinstance(given, int) else np.asarray(given)
-
-
-def _ended(process: subprocess.Popen[bytes]) -> tuple[int | None, int]:
-    """Return how a process ended and its highest memory, bytes; None while it still runs."""
-    deadline = time.monotonic() + _PATIENCE
-    while time.monotonic() < deadline:
-        if not hasattr(os, "wait4"):
-            return process.poll(), 0
-        number, status, usage = os.wait4(process.pid, os.WNOHANG)
-        if number:
-            process.returncode = os.waitstatus_to_exitcode(status)
-            return process.returncode, usage.ru_maxrss * 1024
-        time.sleep(0.01)
-    return None, 0

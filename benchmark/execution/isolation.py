@@ -1,11 +1,12 @@
 """Isolation: one process per worker, so that a run that crashes, hangs or exhausts memory fails alone.
 
 An *isolated process* is a new Python interpreter that receives one task after the other as length-prefixed messages
-over its standard streams. It makes or reads the scene and evaluates; the detector runs in a second process, which never
+over its standard streams. It makes or reads the scene and evaluates; the detector runs in another process, which never
 held anything but measurements (`detection`), so that a detector cannot reach the reference, the seed or the suite.
 Numeric libraries in them use one thread each, because the cores belong to the workers. The caller watches time and
-memory. When a limit is exceeded or the process ends, the task fails with that reason and the
-next task gets a new process. When the caller ends, even by ``kill -9``, the stream closes and the process exits.
+memory. When a limit is exceeded or the process ends, the task fails with that reason and the next task gets a new
+process. When the caller ends, even by ``kill -9``, the stream closes and the process exits. Before, it waits for the
+processes that it started, so that their processor time counts as that of the caller's children.
 """
 
 from __future__ import annotations
@@ -27,12 +28,14 @@ from ...core.package import FOLDER
 from ...core.processes import (
     Limits,
     death_reason,
+    end_children,
     end_tree,
     memory_reason,
     start_python,
     time_reason,
 )
 from ..store.outcomes import Cost, Outcome, ScoreFailure
+from .fork_server import CAN_FORK, ForkServer
 from .messages import Receiver, listen, receive, send
 from .tasks import Task
 
@@ -42,6 +45,7 @@ _PACKAGE = __package__
 _START = f"from {_PACKAGE}.isolation import serve; serve()"
 _WATCH_EVERY = 0.05  # seconds between two checks of a worker with a memory limit
 _LOOK_EVERY = 0.5  # seconds between two checks of any other worker
+_PATIENCE = 5.0  # seconds for a worker to end itself
 
 
 class IsolatedProcess:
@@ -62,7 +66,7 @@ class IsolatedProcess:
         errors.seek(0)
         errors.truncate()
         if limits.memory is not None:
-            for number in [process.pid, *_children(process.pid)]:
+            for number in [process.pid, *_children(process.pid, all_of_them=True)]:
                 bound_allocations(number, limits.memory)
         started = time.monotonic()
         peak = 0
@@ -86,10 +90,19 @@ class IsolatedProcess:
         except (EOFError, OSError, ValueError):  # ValueError: the stream was closed
             return self._failed(process, task, None, started=started, peak=peak)
 
+    def let_end(self) -> None:
+        """Let the process end itself and what it started; `close` waits for it."""
+        if self._process is not None and self._process.stdin is not None:
+            with suppress(OSError):
+                self._process.stdin.close()
+
     def close(self) -> None:
         """End the process."""
+        self.let_end()
         process, self._process = self._process, None
         if process is not None:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(timeout=_PATIENCE)
             end_tree(process.pid)
             with suppress(OSError):
                 process.kill()
@@ -135,18 +148,21 @@ class IsolatedProcess:
         return self._process
 
 
-def _children(process: int) -> list[int]:
-    """Return the processes that a process started itself."""
+def _children(process: int, *, all_of_them: bool = False) -> list[int]:
+    """Return the processes that a process started itself, or all its descendants."""
     import psutil
 
     with suppress(psutil.Error):
-        return [child.pid for child in psutil.Process(process).children()]
+        return [child.pid for child in psutil.Process(process).children(recursive=all_of_them)]
     return []
 
 
 def _peak(process: int) -> int:
-    """Return the highest memory of an isolated process, or of its detector process with the programs of that, bytes."""
-    return max(highest_memory(process), *map(tree_memory, _children(process)), 0)
+    """Return the highest memory of an isolated process, or of a detector process with the programs of that, bytes."""
+    detectors = _children(process)
+    if CAN_FORK:
+        detectors = [child for server in detectors for child in _children(server)]
+    return max(highest_memory(process), *map(tree_memory, detectors), 0)
 
 
 def _search_path() -> str:
@@ -190,6 +206,8 @@ def call_isolated(task: str, limits: Limits) -> bytes:
 
 def close_isolated() -> None:
     """End the isolated processes of all threads of this process."""
+    for process in _every:
+        process.let_end()
     while _every:
         _every.pop().close()
 
@@ -197,8 +215,15 @@ def close_isolated() -> None:
 def serve() -> None:
     """Run tasks from standard input until it closes: the main function of an isolated process.
 
-    It opens scenes and evaluates; detectors run in a process that it starts (`detection`).
+    It opens scenes and evaluates; detectors run in processes that its fork server starts, or that it starts itself
+    where the system cannot fork (`detection`).
     """
+    from .detection import serve_detectors
+    from .detector_process import DetectorProcesses
+    from .worker import execute_text
+
+    # Before the first task is read: nothing that is forked later can know a task.
+    server = ForkServer(serve_detectors) if CAN_FORK else None
     inward, outward = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     # The caller reads the errors of the detector. Those of this process can name scenes, so they go elsewhere.
     errors = os.dup(2)
@@ -206,11 +231,14 @@ def serve() -> None:
     with tempfile.TemporaryFile() as own:
         os.dup2(own.fileno(), 1)
         os.dup2(own.fileno(), 2)
-    tasks = listen(inward, receive)
-    from .detector_process import DetectorProcess
-    from .worker import execute_text
 
-    apart = DetectorProcess(errors, str(Path.cwd()))
+    def end() -> None:
+        if server is not None:
+            server.close()
+        end_children()
+
+    tasks = listen(inward, receive, ending=end)
+    apart = DetectorProcesses(server, errors, str(Path.cwd()))
     while True:
         message = execute_text(
             tasks.get().decode(), detected=lambda detected: send(outward, detected, preliminary=True), apart=apart

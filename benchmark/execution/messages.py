@@ -85,8 +85,13 @@ def _fill(stream: IO[bytes], target: memoryview) -> None:
         filled += count
 
 
-def listen(inward: IO[bytes], read: Callable[[IO[bytes]], T]) -> queue.SimpleQueue[T]:
-    """Return the queue of what arrives; when the stream ends, the caller has ended, and this process ends too."""
+def listen(
+    inward: IO[bytes], read: Callable[[IO[bytes]], T], *, ending: Callable[[], None] = end_children
+) -> queue.SimpleQueue[T]:
+    """Return the queue of what arrives; when the stream ends, the caller has ended, and this process ends too.
+
+    Before it calls `ending`.
+    """
     messages: queue.SimpleQueue[T] = queue.SimpleQueue()
 
     def work() -> None:
@@ -94,7 +99,7 @@ def listen(inward: IO[bytes], read: Callable[[IO[bytes]], T]) -> queue.SimpleQue
             try:
                 messages.put(read(inward))
             except (EOFError, OSError):
-                end_children()
+                ending()
                 os._exit(0)  # nobody needs the result
 
     threading.Thread(target=work, daemon=True).start()

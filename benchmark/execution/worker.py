@@ -36,7 +36,7 @@ from ...scenes.scene import Scene
 from ..identity.recipes import PluginRecipe, SceneRecipe, code_digest
 from ..store.outcomes import Cost, Outcome, SceneRecord, Score, ScoreFailure
 from .detection import detect_on
-from .detector_process import DetectionFailedError, DetectorProcess
+from .detector_process import DetectionFailedError, DetectorProcess, DetectorProcesses
 from .read_ahead import ReadAhead
 from .run_time import Stopwatch, reason_of
 from .scene_picture import scene_picture
@@ -105,7 +105,7 @@ def _runs_here(task: Task) -> bool:
 
 
 def execute_text(
-    task: str, *, detected: Callable[[bytes], None] | None = None, apart: DetectorProcess | None = None
+    task: str, *, detected: Callable[[bytes], None] | None = None, apart: DetectorProcesses | None = None
 ) -> bytes:
     """Run a task given as text, the form in which tasks are sent between processes; see `execute`."""
 
@@ -123,7 +123,7 @@ def execute(
     detector: Detector | None = None,
     evaluators: Sequence[Evaluator] | None = None,
     detected: Callable[[Outcome], None] | None = None,
-    apart: DetectorProcess | None = None,
+    apart: DetectorProcesses | None = None,
 ) -> Outcome:
     """Run a task; a failure or a skip is an outcome, too.
 
@@ -134,7 +134,7 @@ def execute(
         The objects themselves, where task and caller share a process.
     detected : callable, optional
         Called with the outcome as it is before the evaluation, so that a crash of an evaluator loses no detection.
-    apart : DetectorProcess, optional
+    apart : DetectorProcesses, optional
         Where the detector runs, which must not share a process with the reference; by default in this process. A city
         that is one task, timed by the gate and not evaluated, is always detected in this process.
     """
@@ -147,7 +147,7 @@ def execute(
         if detector is not None or apart is None or _runs_here(task):
             runs = _Here(detector if detector is not None else task.detector.detector())
         else:
-            runs = _Apart(apart, task.detector)
+            runs = _Apart(apart.of(task.detector), task.detector)
         if evaluators is None:
             evaluators = [recipe.evaluator() for recipe in task.evaluators]
         if task.part is None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import roofbench as rb
+from roofbench.detectors.registry import make_detector
 from roofbench.scenes.builtin import hamlet
 
 
@@ -49,6 +50,13 @@ class Misbehaving(rb.Detector):
 
     def _hangs(self, scene):
         time.sleep(1000)
+
+    def _burns(self, scene):
+        while time.process_time() < 1.0:
+            pass
+
+    def _meddles(self, scene):
+        make_detector("ndsm").__class__.detect = lambda self, scene, rng=None: rb.Footprints.empty()
 
     def _exits(self, scene):
         sys.exit(7)

@@ -1,12 +1,16 @@
+import dataclasses
 import os
 import signal
 import subprocess
 import sys
 import time
 
+import psutil
 import pytest
 
+from roofbench.benchmark.execution.fork_server import CAN_FORK
 from roofbench.benchmark.execution.isolation import IsolatedProcess
+from roofbench.benchmark.identity.recipes import PluginRecipe
 from roofbench.benchmark.store.outcomes import Outcome
 from roofbench.core.processes import Limits
 
@@ -66,6 +70,31 @@ def test_what_a_detector_prints_does_not_disturb_the_answer(process, task_of):
     assert call(process, task_of("prints")).status == "ok"
 
 
+def test_a_plugin_cannot_change_another_detector(process, task_of):
+    plain = dataclasses.replace(task_of(), detector=PluginRecipe("ndsm", {}))
+    found = call(process, plain).detections
+    assert call(process, task_of("meddles")).status == "ok"
+    assert call(process, plain).detections == found != ()
+
+
+@pytest.mark.skipif(not CAN_FORK, reason="only Linux forks detector processes")
+def test_what_is_forked_had_one_thread(process, task_of):
+    call(process, task_of())
+    (server,) = psutil.Process(process._process.pid).children()
+    assert server.num_threads() == 1
+
+
+def test_the_processor_time_of_detectors_counts_as_that_of_children(task_of):
+    resource = pytest.importorskip("resource", reason="this system does not count it")
+    process = IsolatedProcess()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    process.call(task_of("burns").to_json(), Limits())
+    running = psutil.Process(process._process.pid).children(recursive=True)
+    process.close()
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before > 1.0
+    assert not any(child.is_running() for child in running)
+
+
 def test_files_in_the_working_directory_do_not_replace_modules(task_of, tmp_path, monkeypatch):
     (tmp_path / "roofbench").mkdir()
     (tmp_path / "roofbench" / "__init__.py").write_text("raise SystemExit('the wrong code')")
@@ -79,8 +108,6 @@ def test_files_in_the_working_directory_do_not_replace_modules(task_of, tmp_path
 
 def test_numeric_libraries_get_one_thread_each(process, task_of):
     call(process, task_of())
-    import psutil
-
     environment = psutil.Process(process._process.pid).environ()
     assert environment["NUMBA_NUM_THREADS"] == environment["OPENBLAS_NUM_THREADS"] == "1"
 
@@ -100,7 +127,5 @@ def test_a_worker_exits_when_its_caller_is_killed(task_of):
     caller.send_signal(signal.SIGKILL)
     caller.wait()
     caller.stdout.close()
-    import psutil
-
     psutil.wait_procs([psutil.Process(worker)] if psutil.pid_exists(worker) else [], timeout=10)
     assert not psutil.pid_exists(worker) or psutil.Process(worker).status() == psutil.STATUS_ZOMBIE
