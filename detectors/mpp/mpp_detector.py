@@ -59,7 +59,10 @@ _REMOVED = {
 
 @dataclass(frozen=True, kw_only=True)
 class MPP(MPPParameters, Detector):
-    """Rectangles of a marked point process, found by a search of its energy or sampled by RJMCMC, without any image."""
+    """Rectangles of a marked point process on the points, found by a search of its energy or sampled by RJMCMC.
+
+    An image is read only where the points do not record the number of returns (`image_cue`).
+    """
 
     name: ClassVar[str] = "mpp"
     paper = "after Yu, Li, Guan & Wang 2013, Remote Sensing Letters 4(11), doi:10.1080/2150704X.2013.846487"

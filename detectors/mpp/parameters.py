@@ -142,7 +142,11 @@ class MPPParameters(Parameterised):
         3.0, minimum=0, doc="energy of each number that a roof has more than a flat one", source=_OWN
     )
     texture_weight: float = parameter(
-        1.0, minimum=0, doc="weight of roughness and multiple returns as evidence", source=_OWN, swept=(0, 0.5, 1.0)
+        1.0,
+        minimum=0,
+        doc="weight of roughness, multiple returns and colours as evidence",
+        source=_OWN,
+        swept=(0, 0.5, 1.0),
     )
     texture_limit: float = parameter(
         3.0, minimum=0, doc="bound of that evidence, nats per m2", source=_OWN, swept=(2, 3, 4)

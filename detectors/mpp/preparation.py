@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,13 @@ from ...core.errors import ParameterError
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
-from ..shared.cue_information import PENETRATION, CueInformation
+from ..shared.cue_information import IMAGE, PENETRATION, CueInformation
 from .arrays import Heights, Integers, Mask, Rectangles, Scores, States
 from .background import Background, estimate_background, tally_textures
 from .candidates import Boxes, propose_boxes
-from .cells import cell_size, make_cells
+from .cells import Cells, cell_size, make_cells
 from .energy import Model, rectangle_energies
+from .image_cue import add_image, image_silence, rate_image, tally_image
 from .memory import release_memory
 from .parameters import MPPParameters
 from .patches import Division
@@ -48,6 +49,8 @@ _BOX_STEPS = (0.4, 1.0, 1000.0)
 _LOW_SHARE = 0.7
 #: Names of the textures of a whole scene, counted with and without the number of returns.
 _MULTIPLE_TALLY, _SINGLE_TALLY = "textures", "textures_of_single_returns"
+#: Name of the tally of the image of a whole scene.
+_IMAGE_TALLY = "image"
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +180,22 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
         bins = textures(cells.height, cells.state, cells.openness, threads=threads)
         fitted = fitted_cells(cells, bins, background, weights, threads=threads)
     score = score_cells(cells, bins, background, weights, threads=threads)
+    if MULTIPLE not in cues.used and parameters.texture_weight > 0:
+        score, cues = _with_image(scene, cells, score, cues, parameters.texture_weight)
     return _Classes(background, cells.height, cells.state, score, fitted, cues)
+
+
+def _with_image(
+    scene: Scene, cells: Cells, score: Scores, cues: CueInformation, weight: float
+) -> tuple[Scores, CueInformation]:
+    """Return scores with the image as a further cue, where it has colours and separates roofs from trees."""
+    ratings = rate_image(scene.image, cells.grid)
+    if ratings is None:
+        return score, cues
+    reason = image_silence(_of_whole(scene, _IMAGE_TALLY, tally_image(ratings, cells.state, score)))
+    if reason is not None:
+        return score, replace(cues, silent={**cues.silent, IMAGE: reason})
+    return add_image(score, cells.state, ratings, weight), replace(cues, used=(*cues.used, IMAGE))
 
 
 def _of_whole(scene: Scene, name: str, counted: Integers) -> Integers:
@@ -185,16 +203,22 @@ def _of_whole(scene: Scene, name: str, counted: Integers) -> Integers:
     return np.array(scene.whole[name], dtype=np.int64) if name in scene.whole else counted
 
 
-def survey_textures(parameters: MPPParameters, scene: Scene) -> dict[str, list[list[int]]]:
-    """Return the textures in the core of a scene, counted with and without the number of returns."""
+def survey_textures(parameters: MPPParameters, scene: Scene) -> dict[str, Any]:
+    """Return the textures in the core of a scene, counted with and without the number of returns, and of the image."""
     points = scene.points
     assert points is not None
     cell = parameters.cell or cell_size(points.x, points.y, scene.extent)
     grid, ground = Grid.covering(scene.extent, cell), scene.heights.ground
-    found = {}
+    found: dict[str, Any] = {}
     for name, cloud in ((_MULTIPLE_TALLY, points), (_SINGLE_TALLY, replace(points, number_of_returns=None))):
         cells = make_cells(cloud, ground, grid, low=_LOW_SHARE * parameters.least_height)
-        found[name] = tally_textures(cells, scene.core)[0].tolist()
+        tally, bins = tally_textures(cells, scene.core)
+        found[name] = tally.tolist()
+    ratings = rate_image(scene.image, grid)
+    if ratings is not None:
+        score = score_cells(cells, bins, estimate_background(tally, cell), weights_of(parameters))
+        part = grid.part(scene.core) or (slice(0), slice(0))
+        found[_IMAGE_TALLY] = tally_image(ratings[part], cells.state[part], score[part]).tolist()
     return found
 
 

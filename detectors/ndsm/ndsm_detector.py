@@ -31,8 +31,8 @@ from ...scenes.geodata.raster import Grid
 from ...scenes.ground.heights import Heights, heights_of
 from ...scenes.scene import Scene
 from ..base import Detector
-from ..shared.cue_information import ANCHOR, PENETRATION, CueInformation, informative_cues, silent_on_rasters
-from ..shared.cues import CellCues, cell_cues, greenness
+from ..shared.cue_information import ANCHOR, IMAGE, PENETRATION, CueInformation, informative_cues, silent_on_rasters
+from ..shared.cues import DARKEST, LEAST_GREEN_RED, LEAST_NDVI, CellCues, cell_cues, greenness, rated
 from ..shared.morphology import opened, without_holes
 from ..shared.regularise import regularise
 from ..steps import Step
@@ -44,9 +44,9 @@ __all__ = ["NDSM"]
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
 
-#: Name of the cue from the image, and its weight against 1 for each cue from the points: roofs may be green, trees in
-#: autumn are not, and roofs are displaced in the image.
-_IMAGE, _IMAGE_WEIGHT = "image vegetation", 0.5
+#: Weight of the cue from the image against 1 for each cue from the points: roofs may be green, trees in autumn are not,
+#: and roofs are displaced in the image.
+_IMAGE_WEIGHT = 0.5
 #: Noise of heights, metres, that the threshold of roughness allows for; image matching may have more.
 _LASER_NOISE = 0.12
 #: The thresholds of the cues, each of which may be none.
@@ -105,13 +105,13 @@ class NDSM(Detector):
         doc="share of points below the height above which a high cell looks like a tree; none: unused",
     )
     ndvi: float | None = parameter(
-        0.15, minimum=-1, maximum=1, doc="(NIR - R) / (NIR + R) of vegetation, with a NIR band; none: unused"
+        LEAST_NDVI, minimum=-1, maximum=1, doc="(NIR - R) / (NIR + R) of vegetation, with a NIR band; none: unused"
     )
     green_red: float | None = parameter(
-        0.05, minimum=-1, maximum=1, doc="(G - R) / (G + R) of vegetation, without a NIR band; none: unused"
+        LEAST_GREEN_RED, minimum=-1, maximum=1, doc="(G - R) / (G + R) of vegetation, without a NIR band; none: unused"
     )
     darkest: float = parameter(
-        0.1, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel are ignored: shadow"
+        DARKEST, minimum=0, maximum=1, doc="brightness (0..1) below which the colours of a pixel are ignored: shadow"
     )
     smoothing: float = parameter(
         0.75, unit="m", minimum=0, maximum=5, doc="sigma of the Gaussian that averages the likeness to a tree"
@@ -156,9 +156,9 @@ class NDSM(Detector):
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
         high = np.nan_to_num(cues.high_share) >= 0.5
-        rated = self._cue_likeness(cues, self._vegetation(scene, grid))
-        information = informative_cues(rated, high, known_silent=self._known_silent(points, grid))
-        cue_likeness = {name: rated[name] for name in information.used}
+        ratings = self._cue_likeness(cues, self._vegetation(scene, grid))
+        information = informative_cues(ratings, high, known_silent=self._known_silent(points, grid))
+        cue_likeness = {name: ratings[name] for name in information.used}
         likeness = _averaged(_mean_of(cue_likeness, grid.shape), high, self.smoothing / grid.gsd)
         roof = high & ((likeness < 0) | np.isnan(likeness))
         mask = self._clean(roof, grid.gsd)
@@ -209,10 +209,10 @@ class NDSM(Detector):
             "multiple returns": (cues.multiple_share, self.multiple_share, 0.25),
             ANCHOR: (cues.roughness, self._roughest_roof(cues.noise), 0.2),
             PENETRATION: (cues.penetration, self.penetration, 0.15),
-            _IMAGE: (index, least_index, 0.05),
+            IMAGE: (index, least_index, 0.05),
         }
         return {
-            name: np.clip((value - np.float32(threshold)) / np.float32(width), -1, 1)
+            name: rated(value, threshold, width)
             for name, (value, threshold, width) in rules.items()
             if value is not None and threshold is not None
         }
@@ -262,7 +262,7 @@ def _mean_of(cue_likeness: dict[str, _Floats], shape: tuple[int, int]) -> _Float
     """Return the weighted mean of the cues; NaN where all are unknown."""
     total, weights = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
     for name, cue in cue_likeness.items():
-        weight = np.float32(_IMAGE_WEIGHT if name == _IMAGE else 1)
+        weight = np.float32(_IMAGE_WEIGHT if name == IMAGE else 1)
         known = np.isfinite(cue)
         total += np.where(known, weight * cue, 0)
         weights += weight * known

@@ -27,13 +27,13 @@ from numpy.typing import NDArray
 
 from ...scenes.geodata.density import is_lattice
 
-__all__ = ["ANCHOR", "PENETRATION", "CueInformation", "informative_cues", "silent_on_rasters"]
+__all__ = ["ANCHOR", "IMAGE", "PENETRATION", "CueInformation", "informative_cues", "silence_of", "silent_on_rasters"]
 
 _Floats = NDArray[np.float32]
 
 _NONE: Mapping[str, str] = {}
-#: Names of the cue that is never silent and of the other one from coordinates.
-ANCHOR, PENETRATION = "roughness", "penetration"
+#: Names of the cue that is never silent, of the other one from coordinates, and of that from an image.
+ANCHOR, PENETRATION, IMAGE = "roughness", "penetration", "image vegetation"
 #: Cues from coordinates, which are silent only where they are constant, and the share of cells within `_CONSTANT` of
 #: the median rating from which they are.
 _GEOMETRIC = frozenset({ANCHOR, PENETRATION})
@@ -110,8 +110,28 @@ def informative_cues(
         if not failed or len(used) < 2:
             return CueInformation(tuple(used), silent)
         worst = min(failed, key=failed.__getitem__)
-        silent[worst] = f"it does not separate roofs from trees (separation {failed[worst]:.2f} of 2)"
+        silent[worst] = _reason(failed[worst])
         used.remove(worst)
+
+
+def silence_of(trees: int, of_trees: float, roofs: int, of_roofs: float) -> str | None:
+    """Return why a cue is silent, None where it is not, from the sums of its ratings.
+
+    Parameters
+    ----------
+    trees, roofs : int
+        Cells that the other cues take for trees and for roofs.
+    of_trees, of_roofs : float
+        Sum of the ratings of each.
+    """
+    if not trees + roofs:
+        return "it is not known of any high cell"
+    found = _separation_of(trees, of_trees / max(trees, 1), roofs, of_roofs / max(roofs, 1))
+    return None if found >= _LEAST_SEPARATION else _reason(found)
+
+
+def _reason(separation: float) -> str:
+    return f"it does not separate roofs from trees (separation {separation:.2f} of 2)"
 
 
 def _is_constant(rating: _Floats) -> bool:
@@ -121,14 +141,20 @@ def _is_constant(rating: _Floats) -> bool:
 
 
 def _separation(name: str, values: Mapping[str, _Floats]) -> float:
-    """Return the separation of a cue by the mean of the others; 2 where it cannot be tested and may be right."""
+    """Return the separation of a cue by the mean of the others."""
     own = values[name]
     others = [np.nan_to_num(rating) for other, rating in values.items() if other != name]
     opinion = np.mean(others, axis=0) if others else np.zeros_like(own)
     known = np.isfinite(own)
     trees, roofs = own[known & (opinion > 0)], own[known & (opinion < 0)]
-    if len(roofs) >= _FEWEST and roofs.mean() > 0 and (len(trees) < _FEWEST or trees.mean() <= roofs.mean()):
+    means = [float(values.mean()) if len(values) else 0.0 for values in (trees, roofs)]
+    return _separation_of(len(trees), means[0], len(roofs), means[1])
+
+
+def _separation_of(trees: int, of_trees: float, roofs: int, of_roofs: float) -> float:
+    """Return the separation from numbers of cells and mean ratings; 2 where it cannot be tested and may be right."""
+    if roofs >= _FEWEST and of_roofs > 0 and (trees < _FEWEST or of_trees <= of_roofs):
         return 0.0
-    if len(trees) < _FEWEST or len(roofs) < _FEWEST:
+    if trees < _FEWEST or roofs < _FEWEST:
         return 2.0
-    return float(trees.mean() - roofs.mean())
+    return of_trees - of_roofs

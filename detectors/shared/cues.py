@@ -29,9 +29,12 @@ from ...core.kernels import kernel
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
 
-__all__ = ["CellCues", "cell_cues", "greenness"]
+__all__ = ["DARKEST", "LEAST_GREEN_RED", "LEAST_NDVI", "CellCues", "cell_cues", "greenness", "rated"]
 
 _Floats = NDArray[np.float32]
+
+#: Greenness of vegetation with and without near infrared, and brightness (0..1) below which colours are noise.
+LEAST_NDVI, LEAST_GREEN_RED, DARKEST = 0.15, 0.05, 0.1
 
 #: Least number of points in the 3 x 3 cells around a cell without points from which its high share is taken.
 _NEIGHBOURS = 3
@@ -175,6 +178,12 @@ def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     weight = cv2.remap(weight, map_x, map_y, **options)
     total = cv2.remap(total, map_x, map_y, **options)
     return np.where(weight > 0.25, total / np.maximum(weight, np.float32(0.25)), np.float32(np.nan))
+
+
+def rated(values: _Floats, threshold: float, width: float) -> _Floats:
+    """Return the rating of values: -1 (roof) to +1 (tree), 0 at the threshold, the ends a width away from it."""
+    ratings: _Floats = np.clip((values - np.float32(threshold)) / np.float32(width), -1, 1)
+    return ratings
 
 
 def _on_grid(values: NDArray[np.generic], grid: Grid) -> _Floats:
