@@ -61,7 +61,8 @@ _REMOVED = {
 class MPP(MPPParameters, Detector):
     """Rectangles of a marked point process on the points, found by a search of its energy or sampled by RJMCMC.
 
-    An image is read only where the points do not record the number of returns (`image_cue`).
+    An image is read where the points do not record the number of returns (`image_cue`), and around blocks that may be
+    rows (`wall_colours`).
     """
 
     name: ClassVar[str] = "mpp"

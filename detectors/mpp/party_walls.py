@@ -1,4 +1,4 @@
-"""Party walls: where the roof of a row of houses is cut across, seen in the heights of its cells.
+"""Party walls: where the roof of a row of houses is cut across, seen in the heights and colours of its cells.
 
 Nouns
 -----
@@ -11,9 +11,13 @@ step
 valley
     Median over the lines of how far a station lies below the roof on both sides, and the share of the lines with one:
     the gutter between two gables that face the street.
+colour edge
+    Length of the median over the lines of the difference of colour (shares of red and of blue) between the two sides
+    of a station, and the share of the lines whose difference points that way and exceeds the noise.
 party wall
-    A station with a step or a valley through most of the lines, at least `_NARROWEST` from other ones and from the
-    ends. Walls are found twice: *certain* ones show that a building is a row, *probable* ones cut a row into houses.
+    A station with a step, a valley or a colour edge through most of the lines, at least `_NARROWEST` from other ones
+    and from the ends. Walls are found twice: *certain* ones show that a building is a row, *probable* ones cut a row
+    into houses.
 
 The thresholds were chosen on the development scenes (docs/results/mpp.md), not on scenes kept for tests.
 """
@@ -29,14 +33,20 @@ from ...scenes.geodata.raster import Grid
 from .arrays import Floats, Rectangles
 from .cells import HIGH
 from .rectangles import corners
+from .wall_colours import Colours, colours_at
 
-__all__ = ["CERTAIN", "PROBABLE", "Wall", "WallRule", "most_walls", "party_walls", "wall_strength"]
+__all__ = ["CERTAIN", "PROBABLE", "Wall", "WallRule", "colour_strength", "most_walls", "party_walls", "wall_strength"]
 
 #: Metres: spacing of the lattice, narrowest house, smallest depth of a rectangle with walls (the front or the rear half
 #: of a row often has one of its own), widest house of a row (median).
 _LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 3.5, 12.0
 #: Stations that a mean reaches on either side, and that lie between a valley and its shoulders.
 _REACH, _SHOULDER = 2, 2
+#: Stations that the mean of colours reaches on either side: they are blurred by a pixel, and pixels are displaced.
+_COLOUR_REACH = 3
+#: Share of the least colour edge that is noise, share of the lines that must have colours, and metres of a step that a
+#: difference of 1 counts like.
+_COLOUR_NOISE, _KNOWN_COLOUR, _COLOUR_METRES = 0.5, 0.5, 20.0
 #: Metres: height differences that are noise, for steps and for valleys.
 _STEP_NOISE, _VALLEY_NOISE = 0.12, 0.25
 #: Share of the lines that must have heights for a step, and for a valley.
@@ -57,16 +67,20 @@ class WallRule(NamedTuple):
         Least share of the lines that show it.
     step, valley : float
         Least median over the lines, m.
+    colour_share, colour : float
+        The same of a colour edge, which has no unit.
     """
 
     step_share: float
     step: float
     valley_share: float
     valley: float
+    colour_share: float
+    colour: float
 
 
-CERTAIN = WallRule(0.75, 0.25, 0.75, 0.4)
-PROBABLE = WallRule(0.5, 0.1, 0.5, 0.15)
+CERTAIN = WallRule(0.75, 0.25, 0.75, 0.4, 0.75, 0.02)
+PROBABLE = WallRule(0.5, 0.1, 0.5, 0.15, 0.6, 0.01)
 
 
 class Wall(NamedTuple):
@@ -84,7 +98,12 @@ def most_walls(rectangles: Rectangles, grid: Grid) -> NDArray[np.int64]:
 
 
 def party_walls(
-    rectangle: Rectangles, height: NDArray[np.uint16], state: NDArray[np.uint8], grid: Grid, rule: WallRule
+    rectangle: Rectangles,
+    height: NDArray[np.uint16],
+    state: NDArray[np.uint8],
+    grid: Grid,
+    rule: WallRule,
+    colours: Colours | None = None,
 ) -> list[Wall]:
     """Return the party walls across the longer side of a rectangle, in order; none where houses would be wide.
 
@@ -98,6 +117,8 @@ def party_walls(
         See `cells`.
     grid : Grid
     rule : WallRule
+    colours : Colours, optional
+        Around the rectangle, where there is an image.
     """
     place = corners(rectangle)[0] * grid.gsd
     first, second = place[1] - place[0], place[3] - place[0]
@@ -113,9 +134,11 @@ def party_walls(
     x, y = (place[0] + stations[:, None, None] * u + lines[None, :, None] * v).transpose(2, 0, 1) / grid.gsd
     column = np.clip(_cell_of(x), 0, grid.columns - 1)
     row = np.clip(_cell_of(y), 0, grid.rows - 1)
-    profile = np.where(state[row, column] == HIGH, height[row, column] / 100.0, np.nan)
+    high = state[row, column] == HIGH
+    strength = wall_strength(np.where(high, height[row, column] / 100.0, np.nan), rule)
+    if colours is not None:
+        strength += colour_strength(np.where(high, colours_at(colours, row, column), np.nan), rule)
     found: list[float] = []
-    strength = wall_strength(profile, rule)
     for station in np.argsort(-strength, kind="stable"):
         if strength[station] <= 0:
             break
@@ -163,6 +186,34 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     share = (known & (valley > _VALLEY_NOISE)).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     sunk = (known.mean(axis=1) >= _KNOWN_VALLEY) & (share >= rule.valley_share) & (middle >= rule.valley)
     strength[sunk] += middle[sunk]
+    return strength
+
+
+def colour_strength(shares: Floats, rule: WallRule) -> Floats:
+    """Return the evidence of colours for a wall before each station, shape (stations,); 0 where there is none.
+
+    Parameters
+    ----------
+    shares : ndarray, shape (2, stations, lines)
+        Shares of red and of blue; NaN where they are not known.
+    rule : WallRule
+    """
+    _, count, lines = shares.shape
+    strength = np.zeros(count)
+    if count < 2 * _COLOUR_REACH or not np.isfinite(shares).any():
+        return strength
+    edges = np.full((2, count, lines), np.nan)
+    for edge, share in zip(edges, shares, strict=True):
+        means = _means(share, _COLOUR_REACH)
+        edge[_COLOUR_REACH : 1 - _COLOUR_REACH] = means[_COLOUR_REACH:] - means[:-_COLOUR_REACH]
+    middle = np.stack([_median(edge) for edge in edges])
+    size = np.hypot(*middle)
+    known = np.isfinite(edges).all(axis=0)
+    along = (edges * middle[:, :, None]).sum(axis=0) / np.maximum(size, 1e-12)[:, None]
+    agree = known & (along > _COLOUR_NOISE * rule.colour)
+    share = agree.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    seen = (known.mean(axis=1) >= _KNOWN_COLOUR) & (share >= rule.colour_share) & (size >= rule.colour)
+    strength[seen] = _COLOUR_METRES * size[seen]
     return strength
 
 

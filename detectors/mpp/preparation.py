@@ -7,6 +7,7 @@ needed.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import ParameterError
 from ...scenes.geodata.points import PointCloud
-from ...scenes.geodata.raster import Grid
+from ...scenes.geodata.raster import Grid, Image
 from ...scenes.scene import Scene
 from ..shared.cue_information import IMAGE, PENETRATION, CueInformation
 from .arrays import Heights, Integers, Mask, Rectangles, Scores, States
@@ -76,6 +77,8 @@ class Prepared:
         Which cues the evidence is made of.
     core : tuple of float
         Part of the scene whose buildings are wanted (`Scene.core`), metres.
+    image_of : callable
+        Returns the image of the scene, read only where it is needed.
     """
 
     grid: Grid
@@ -88,6 +91,7 @@ class Prepared:
     boxes: Boxes
     cues: CueInformation
     core: tuple[float, float, float, float]
+    image_of: Callable[[], Image | None]
 
 
 def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads: Threads) -> Prepared:
@@ -109,7 +113,7 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
     tables = make_tables(kept, fitted, score, threads=threads)
     model, grid = _model(parameters, cell), Grid.covering(scene.extent, cell)
     rated = _rated(boxes, tables, model, threads)
-    return Prepared(grid, kept, state, score, background, tables, model, rated, cues, scene.core)
+    return Prepared(grid, kept, state, score, background, tables, model, rated, cues, scene.core, lambda: scene.image)
 
 
 def _division(parameters: MPPParameters, grid: Grid) -> Division:

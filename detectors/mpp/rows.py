@@ -18,6 +18,7 @@ building
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,11 +26,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...scenes.geodata.raster import Grid
+from ...scenes.geodata.raster import Grid, Image
 from .arrays import Rectangles
 from .buildings import block_of, outline_buildings
 from .party_walls import CERTAIN, PROBABLE, Wall, most_walls, party_walls
 from .rectangles import to_world
+from .wall_colours import colours_of
 
 __all__ = ["Levels", "find_levels"]
 
@@ -85,6 +87,7 @@ def find_levels(
     height: NDArray[np.uint16],
     state: NDArray[np.uint8],
     grid: Grid,
+    image_of: Callable[[], Image | None] = lambda: None,
 ) -> Levels:
     """Return parts and buildings.
 
@@ -99,6 +102,8 @@ def find_levels(
     state : ndarray of uint8, shape (rows, columns)
         See `cells`.
     grid : Grid
+    image_of : callable
+        Returns the image of the scene; called only where a block has room for a row.
     """
     block = block_of(shapely.polygons(to_world(rectangles, grid)), blocks)
     inside = block >= 0
@@ -106,8 +111,10 @@ def find_levels(
     # Most blocks are too small for a row, whatever their roofs look like.
     looked_at = inside & np.append(_are_rows(blocks, room), False)[block]
     certain = np.zeros(len(rectangles), dtype=np.int64)
+    image = image_of() if looked_at.any() else None
+    colours = {number: colours_of(blocks[number], image, grid) for number in np.unique(block[looked_at]).tolist()}
     for k in np.flatnonzero(looked_at).tolist():
-        certain[k] = len(party_walls(rectangles[k], height, state, grid, CERTAIN))
+        certain[k] = len(party_walls(rectangles[k], height, state, grid, CERTAIN, colours[block[k]]))
     walls_of_block = np.bincount(block[inside], weights=certain[inside], minlength=len(blocks))
     most_of_block = np.zeros(len(blocks), dtype=np.int64)
     np.maximum.at(most_of_block, block[inside], certain[inside])
@@ -133,7 +140,8 @@ def find_levels(
             buildings.append(blocks[number])
             block_of_building.append(number)
             continue
-        walls = [party_walls(rectangle, height, state, grid, PROBABLE) for rectangle in rectangles[members]]
+        near = colours[number]
+        walls = [party_walls(rectangle, height, state, grid, PROBABLE, near) for rectangle in rectangles[members]]
         pieces, owners = _pieces(rectangles[members], blocks[number], walls, grid)
         group = _houses(pieces, owners)
         parts += pieces

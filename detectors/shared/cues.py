@@ -14,6 +14,8 @@ roughness
     the windows that contain it, so that ridges, eaves and steps between roofs are smooth.
 greenness
     (NIR - R) / (NIR + R), or (G - R) / (G + R) without near infrared; NaN in the dark, where colours are noise.
+chromaticity
+    Shares of red and of blue in the sum of red, green and blue; NaN in the dark.
 
 Axis order (row, column), row 0 northernmost. Cells without a value are NaN.
 """
@@ -29,7 +31,7 @@ from ...core.kernels import kernel
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
 
-__all__ = ["DARKEST", "LEAST_GREEN_RED", "LEAST_NDVI", "CellCues", "cell_cues", "greenness", "rated"]
+__all__ = ["DARKEST", "LEAST_GREEN_RED", "LEAST_NDVI", "CellCues", "cell_cues", "chromaticity", "greenness", "rated"]
 
 _Floats = NDArray[np.float32]
 
@@ -152,8 +154,6 @@ def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     darkest : float
         Pixels whose brightest band is below this (0..1) are ignored.
     """
-    import cv2
-
     if {"nir", "red"} <= set(image.bands):
         more, less = image.band("nir"), image.band("red")
     elif {"green", "red"} <= set(image.bands):
@@ -163,21 +163,48 @@ def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     bright = np.maximum(more, less)
     if not bright.any():
         return None
-    usable = (bright >= darkest) if image.valid is None else (bright >= darkest) & image.valid
-    index = np.where(usable, (more - less) / np.maximum(more + less, np.float32(1e-6)), np.float32(0))
+    index = (more - less) / np.maximum(more + less, np.float32(1e-6))
+    return _cell_means((index,), bright >= darkest, image, grid)[0]
+
+
+def chromaticity(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
+    """Return the shares of red and of blue in the colour of each cell of a grid, shape (2, rows, columns).
+
+    Shares do not depend on how brightly a slope is lit. None when the image has no colours; `darkest`: see `greenness`.
+    """
+    if not image.is_colour:
+        return None
+    red, green, blue = (image.band(name) for name in ("red", "green", "blue"))
+    total = np.maximum(red + green + blue, np.float32(1e-6))
+    bright = np.maximum(np.maximum(red, green), blue)
+    return np.stack(_cell_means((red / total, blue / total), bright >= darkest, image, grid))
+
+
+def _cell_means(values: tuple[_Floats, ...], usable: NDArray[np.bool_], image: Image, grid: Grid) -> list[_Floats]:
+    """Return the means of the usable pixels per cell; NaN where more than three quarters of a cell have none."""
+    import cv2
+
+    usable = usable if image.valid is None else usable & image.valid
     # Averaging over about one cell before sampling at the cell centres avoids aliasing.
     width = max(1, round(grid.gsd / image.grid.gsd))
-    weight = cv2.blur(usable.astype(np.float32), (width, width), borderType=cv2.BORDER_CONSTANT)
-    total = cv2.blur(index, (width, width), borderType=cv2.BORDER_CONSTANT)
     x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)
     _, y = grid.to_world(np.arange(grid.rows) + 0.5, 0)
     _, column = image.grid.to_pixel(x, image.grid.north)
     row, _ = image.grid.to_pixel(image.grid.west, y)
     map_x, map_y = np.meshgrid((column - 0.5).astype(np.float32), (row - 0.5).astype(np.float32))
-    options = {"interpolation": cv2.INTER_LINEAR, "borderMode": cv2.BORDER_CONSTANT, "borderValue": 0}
-    weight = cv2.remap(weight, map_x, map_y, **options)
-    total = cv2.remap(total, map_x, map_y, **options)
-    return np.where(weight > 0.25, total / np.maximum(weight, np.float32(0.25)), np.float32(np.nan))
+
+    def sampled(pixels: _Floats) -> _Floats:
+        blurred = cv2.blur(pixels, (width, width), borderType=cv2.BORDER_CONSTANT)
+        cells: _Floats = cv2.remap(
+            blurred, map_x, map_y, interpolation=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
+        )
+        return cells
+
+    weight = sampled(usable.astype(np.float32))
+    known, divisor = weight > 0.25, np.maximum(weight, np.float32(0.25))
+    return [
+        np.where(known, sampled(np.where(usable, one, np.float32(0))) / divisor, np.float32(np.nan)) for one in values
+    ]
 
 
 def rated(values: _Floats, threshold: float, width: float) -> _Floats:

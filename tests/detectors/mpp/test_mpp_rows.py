@@ -10,10 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roofbench.detectors.mpp.cells import HIGH, LOW
-from roofbench.detectors.mpp.party_walls import CERTAIN, PROBABLE, most_walls, party_walls, wall_strength
+from roofbench.detectors.mpp.party_walls import (
+    CERTAIN,
+    PROBABLE,
+    colour_strength,
+    most_walls,
+    party_walls,
+    wall_strength,
+)
 from roofbench.detectors.mpp.rectangles import to_world
 from roofbench.detectors.mpp.rows import find_levels
-from roofbench.scenes.geodata.raster import Grid
+from roofbench.scenes.geodata.raster import Grid, Image
 
 GRID = Grid(1000.0, 2000.0, 0.5, 160, 260)
 
@@ -172,6 +179,33 @@ def test_the_strength_of_walls_is_that_of_plain_loops(seed, stations, lines, rul
     np.testing.assert_allclose(wall_strength(profile, rule), expected, atol=1e-9)
 
 
+def slow_colours(shares, rule):
+    """The definition of a colour edge, station by station and line by line."""
+    _, stations, lines = shares.shape
+    strength = np.zeros(stations)
+    for i in range(3, stations - 2):
+        edges = [[np.nanmean(s[i : i + 3, k]) - np.nanmean(s[i - 3 : i, k]) for s in shares] for k in range(lines)]
+        edges = np.array(edges)
+        middle = [np.nanmedian(column) if np.isfinite(column).any() else 0.0 for column in edges.T]
+        size = math.hypot(*middle)
+        known = [edge for edge in edges if np.isfinite(edge).all()]
+        agree = sum(np.dot(edge, middle) > 0.5 * rule.colour * size for edge in known)
+        if known and len(known) >= 0.5 * lines and agree >= rule.colour_share * len(known) and size >= rule.colour:
+            strength[i] = 20 * size
+    return strength
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(3, 30), st.integers(1, 9), st.sampled_from([CERTAIN, PROBABLE]))
+def test_the_strength_of_colour_edges_is_that_of_plain_loops(seed, stations, lines, rule):
+    rng = np.random.default_rng(seed)
+    shares = 0.33 + rng.normal(0, 0.005, (2, stations, lines)) + rng.choice([0, 0.02, 0.08], (2, stations, 1))
+    shares[:, rng.random((stations, lines)) < rng.choice([0, 0.2, 0.6])] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        expected = slow_colours(shares, rule)
+    np.testing.assert_allclose(colour_strength(shares, rule), expected, atol=1e-9)
+
+
 def levels(roofs, rectangles):
     height, state = place(*roofs)
     rectangles = np.array(rectangles)
@@ -212,6 +246,22 @@ def test_a_house_with_a_wing_is_one_building_and_a_part_outside_blocks_another()
 def test_a_long_row_needs_fewer_walls_than_a_short_block(houses, length, buildings):
     sides = (10, 10, 10 + length, 20)
     found, _ = levels([(sides, steps(length / houses, 10.0, 0.6))], [rectangle(*sides)])
+    assert len(found.buildings) == buildings
+
+
+@pytest.mark.parametrize(("other", "buildings"), [((90, 100, 120), 6), ((75, 50, 40), 1)], ids=["slate", "shade"])
+def test_tiles_of_another_colour_are_another_house_and_shade_is_not(other, buildings):
+    row = (10, 10, 46, 20)
+    height, state = place((row, flat))
+    x = (np.arange(2 * GRID.columns) + 0.5) * GRID.gsd / 2
+    red = ((x - 10) // 6) % 2 == 0
+    lines = np.where(red[:, None], (150, 100, 80), other).T.astype(np.uint8)
+    fine = Grid(GRID.west, GRID.north, GRID.gsd / 2, 2 * GRID.rows, 2 * GRID.columns)
+    image = Image(np.repeat(lines[:, None], fine.rows, axis=1), ("red", "green", "blue"), fine)
+    sides = np.array([rectangle(*row)])
+    blocks = shapely.polygons(to_world(sides, GRID))
+    assert len(find_levels(sides, blocks, height, state, GRID).buildings) == 1
+    found = find_levels(sides, blocks, height, state, GRID, lambda: image)
     assert len(found.buildings) == buildings
 
 

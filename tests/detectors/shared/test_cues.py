@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from naive import cues as naive_cues
 
-from roofbench.detectors.shared.cues import cell_cues, greenness
+from roofbench.detectors.shared.cues import cell_cues, chromaticity, greenness
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Grid, Image
 
@@ -99,6 +99,17 @@ def test_shadow_and_missing_pixels_have_no_greenness():
 def test_a_grey_image_has_no_greenness():
     grey = Image(np.full((1, 8, 10), 100, dtype=np.uint8), ("grey",), GRID)
     assert greenness(grey, GRID, darkest=0.1) is None
+    assert chromaticity(grey, GRID, darkest=0.1) is None
+
+
+def test_chromaticity_is_that_of_the_tiles_in_sun_and_shade():
+    values = np.array([120, 60, 60], np.uint8)[:, None, None] * np.ones(GRID.shape)
+    values[:, :, 5:] *= 0.5
+    values[:, 7:] = 5
+    shares = chromaticity(Image(values.astype(np.uint8), ("red", "green", "blue"), GRID), GRID, darkest=0.1)
+    np.testing.assert_allclose(shares[0, :7], 0.5, atol=0.01)
+    np.testing.assert_allclose(shares[1, :7], 0.25, atol=0.01)
+    assert np.isnan(shares[:, 7:]).all()
 
 
 @pytest.mark.parametrize("window", [2.0, 3.0])
