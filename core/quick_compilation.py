@@ -1,9 +1,10 @@
 """Quick compilation: slow parts of numba's compiler, replaced while a kernel is compiled.
 
-Most of the time of a compilation is spent in Python, on work that leaves no trace in the result: colours of messages
-that nobody reads, events without listeners, a comparison of all options, and the types of ``float * float`` for the
-hundredth time. The replacements here return what numba's own methods return; only the message of a slice assignment of
-the wrong shape has no shapes. They are in place while `quick_compilation` is entered, under numba's global lock.
+Most of the time of a compilation is spent in Python, on work that does not change the result: colours of messages that
+are never printed, events without listeners, comparisons of all options, repeated inference of the types of
+``float * float``, and variables that live at the start of each block, which only generators and object mode use. The
+replacements here return what numba's own methods return; only the message of a slice assignment of the wrong shape has
+no shapes. They are in place while `quick_compilation` is entered, under numba's global lock.
 """
 
 from __future__ import annotations
@@ -13,12 +14,16 @@ import operator
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from types import BuiltinFunctionType
 from typing import Any
 
 from llvmlite.binding import ffi
-from numba.core import errors, ir, registry, targetconfig
+from numba.core import base, compiler_machinery, errors, ir, postproc, registry, targetconfig, transforms, typeinfer
 from numba.core import types as numba_types
+from numba.core.runtime import context as runtime
 from numba.core.types import functions
+from numba.core.typing import context as typing_context
+from numba.core.typing import typeof
 from numba.np import arrayobj
 
 __all__ = ["quick_compilation"]
@@ -33,7 +38,16 @@ _cpu: Any = registry.cpu_target
 _BaseFunction: Any = functions.BaseFunction
 _TargetConfig: Any = targetconfig.TargetConfig
 _ConfigStack: Any = targetconfig.ConfigStack
+_PostProcessor: Any = postproc.PostProcessor
+_BaseContext: Any = base.BaseContext
+_TypingContext: Any = typing_context.BaseContext
+_NRTContext: Any = runtime.NRTContext
+_canonicalize: Any = transforms.canonicalize_cfg
 _call_type = _BaseFunction.get_call_type
+_post_process = _PostProcessor.run
+_refresh = _BaseContext.refresh
+_value_type = _TypingContext.resolve_value_type
+_count_references = _NRTContext._call_incref_decref
 
 #: Functions of numbers whose types follow from those of their arguments alone.
 _SCALAR = frozenset(
@@ -42,6 +56,7 @@ _SCALAR = frozenset(
 )
 _known: dict[Any, tuple[Any, Any]] = {}
 _declared: dict[Any, tuple[dict[str, Any], int]] = {}
+_refreshed: dict[int, int] = {}
 
 
 @contextmanager
@@ -69,13 +84,19 @@ def _replacements() -> list[tuple[Any, str, Any]]:
     # The text with both shapes takes a second to compile.
     templates = _cpu.typing_context.resolve_value_type(_arrayobj.raise_with_shape_context).templates
     shape_error = staticmethod(_arrayobj.ol_raise_with_shape_context_generic)
+    plain = _Plain()
     return [
         (_BaseFunction, "get_call_type", _call_type_of_scalars),
         (_TargetConfig, "__eq__", _equal_options),
         (_TargetConfig, "__hash__", _hash_of_options),
         (_TargetConfig, "values", _values_of_options),
         (_ir.Inst, "_rec_list_vars", _variables),
-        (_errors, "_termcolor_inst", _Plain()),
+        (_PostProcessor, "run", _variable_lifetimes),
+        (_BaseContext, "refresh", _refresh_after_growth),
+        (_TypingContext, "resolve_value_type", _type_of_value),
+        (_NRTContext, "_call_incref_decref", _references),
+        (_errors, "_termcolor_inst", plain),
+        *((module, "_termcolor", plain) for module in (compiler_machinery, functions, ir, typeinfer, typeof)),
         *((template, "_overload_func", shape_error) for template in templates),
     ]
 
@@ -145,3 +166,42 @@ def _variables(self: Any, value: Any) -> list[Any]:
         elif isinstance(item, dict | list | tuple):
             found.extend(_variables(self, item))
     return found
+
+
+def _variable_lifetimes(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """Replace `PostProcessor.run`: lifetimes are computed when they are used."""
+    if self.func_ir.is_generator:
+        _post_process(self, emit_dels, extend_lifetimes)
+        return
+    self.func_ir.blocks = _canonicalize(self.func_ir.blocks)
+    self.func_ir.variable_lifetime = postproc.VariableLifetime(self.func_ir.blocks)
+    self.func_ir.generator_info = None
+    if emit_dels:
+        self._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+
+def _refresh_after_growth(self: Any) -> None:
+    """Replace `BaseContext.refresh`: registries without new entries are not read again."""
+    shared = id(self._registries)  # by the contexts of all compilations
+    if _refreshed.get(shared) != _entries(self):
+        _refresh(self)
+        _refreshed[shared] = _entries(self)
+
+
+def _entries(context: Any) -> int:
+    """Return the number of entries in the registries of a context and of its typing context."""
+    both = context, context.typing_context
+    loaders = [item for one in both for item in one._registries.items()]
+    return sum(len(getattr(registry, name)) for registry, loader in loaders for name in loader.registry_items)
+
+
+def _type_of_value(self: Any, value: Any) -> Any:
+    """Replace `BaseContext.resolve_value_type`: an operator is no array and no number."""
+    kind = self._get_global_type(value) if type(value) is BuiltinFunctionType else None
+    return _value_type(self, value) if kind is None else kind
+
+
+def _references(self: Any, builder: Any, kind: Any, value: Any, function: str) -> None:
+    """Replace `NRTContext._call_incref_decref`: a number is not counted."""
+    if not _is_number(kind):
+        _count_references(self, builder, kind, value, function)

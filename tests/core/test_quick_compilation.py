@@ -1,19 +1,30 @@
 """Numba's slow methods are replaced while a kernel is compiled, and return what numba's own return."""
 
+import math
 import operator
 
 import numba
 import numpy as np
 import pytest
+from llvmlite import ir as llvm
 from llvmlite.binding import ffi
-from numba.core import compiler, cpu, errors, ir, registry, targetconfig, types
+from numba.core import base, compiler, cpu, errors, ir, postproc, registry, targetconfig, types
+from numba.core.runtime.context import NRTContext
 from numba.core.types import functions
+from numba.core.typing.context import BaseContext
+from numba.extending import overload
 
 from roofbench.core import quick_compilation as home
 from roofbench.core.kernels import kernel
 
-OWNERS = functions.BaseFunction, targetconfig.TargetConfig, ir.Inst
-NAMES = "get_call_type", "__eq__", "__hash__", "values", "_rec_list_vars"
+OWNERS = (
+    *(functions.BaseFunction, targetconfig.TargetConfig, ir.Inst, postproc.PostProcessor),
+    *(base.BaseContext, BaseContext, NRTContext, ir),
+)
+NAMES = (
+    *("get_call_type", "__eq__", "__hash__", "values", "_rec_list_vars", "run", "refresh", "resolve_value_type"),
+    *("_call_incref_decref", "_termcolor"),
+)
 
 
 def state():
@@ -83,16 +94,74 @@ def test_options_have_the_values_of_numba():
     assert home._equal_options(plain, cpu) is NotImplemented
 
 
-def test_the_variables_of_statements_are_those_of_numba():
-    def function(x, y):
-        values = [(x, y), (y, x)]
-        total = {"a": x}
-        for item in values:
-            total["b"] = item[0] + max(*item) if x > y else -y
-        return total
+def mixed(x, y):
+    values = [(x, y), (y, x)]
+    total = {"a": x}
+    for item in values:
+        total["b"] = item[0] + max(*item) if x > y else -y
+    return total
 
-    statements = [statement for block in compiler.run_frontend(function).blocks.values() for statement in block.body]
+
+def counted(stop):
+    while stop > 0:
+        yield stop
+        stop -= 1
+
+
+def test_the_variables_of_statements_are_those_of_numba():
+    statements = [statement for block in compiler.run_frontend(mixed).blocks.values() for statement in block.body]
     for statement in statements:
         parts = [statement, *(part for part in vars(statement).values() if isinstance(part, ir.Inst))]
         for part in parts:
             assert home._variables(part, part.__dict__) == ir.Inst._rec_list_vars(part, part.__dict__)
+
+
+@pytest.mark.parametrize("function", [mixed, counted])
+def test_lifetimes_and_deletions_are_those_of_numba(function):
+    own, other = compiler.run_frontend(function), compiler.run_frontend(function)
+    home._post_process(postproc.PostProcessor(own), True)
+    home._variable_lifetimes(postproc.PostProcessor(other), True)
+    assert own.dump_to_string() == other.dump_to_string()
+    assert own.variable_lifetime.livemap == other.variable_lifetime.livemap
+    assert bool(other.generator_info) is (function is counted)
+
+
+def test_the_types_of_values_are_those_of_numba():
+    context = registry.cpu_target.typing_context
+    context.refresh()
+    for value in (operator.add, math.sqrt, len, min, float, 1, 2.5, True, "text", None, np.zeros(2), np, np.add, mixed):
+        try:
+            own = home._value_type(context, value)
+        except ValueError:
+            with pytest.raises(ValueError, match="Cannot determine"):
+                home._type_of_value(context, value)
+        else:
+            assert home._type_of_value(context, value) == own
+
+
+def test_an_overload_that_is_registered_late_is_found():
+    def late(x):
+        raise NotImplementedError
+
+    @kernel
+    def before(x):
+        return x + 1
+
+    @kernel
+    def after(x):
+        return late(x)
+
+    assert before(1) == 2
+    overload(late)(lambda x: lambda x: x + 5)
+    assert after(1) == 6
+
+
+def test_numbers_have_no_references():
+    context = registry.cpu_target.target_context.subtarget(enable_nrt=True)
+    number = types.int64, types.float32, types.boolean, types.literal(2)
+    for kind in number:
+        value = context.get_value_type(kind)
+        function = llvm.Function(llvm.Module(), llvm.FunctionType(llvm.VoidType(), [value]), "function")
+        builder = llvm.IRBuilder(function.append_basic_block())
+        home._count_references(context.nrt, builder, kind, function.args[0], "NRT_incref")
+        assert not builder.block.instructions
