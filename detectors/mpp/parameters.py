@@ -50,12 +50,12 @@ class MPPParameters(Parameterised):
         source=_OWN,
     )
     least_height: float = parameter(
-        2.5,
+        2.2,
         unit="m",
         minimum=0.5,
         doc="least mean height of a roof above ground",
-        source="Awrangjeb et al. 2010, height threshold T_h",
-        swept=(2.0, 2.5, 3.0),
+        source="Awrangjeb et al. 2010, height threshold T_h (2.5 m)",
+        swept=(2.0, 2.2, 2.5, 3.0),
     )
     least_side: float = parameter(
         2.0, unit="m", minimum=0.5, doc="shortest side of a building", source=_OWN, swept=(2.0, 3.0)

@@ -47,7 +47,7 @@ _LONGEST_PATCH = 1.5
 _BOX_STEPS = (0.4, 1.0, 1000.0)
 #: Share of the least height of a roof below which a point is low: eaves and the annexes beside a roof are lower than
 #: its mean, and the ground may be some decimetres too high.
-_LOW_SHARE = 0.7
+_LOW_SHARE = 0.8
 #: Names of the textures of a whole scene, counted with and without the number of returns.
 _MULTIPLE_TALLY, _SINGLE_TALLY = "textures", "textures_of_single_returns"
 #: Name of the tally of the image of a whole scene.

@@ -31,7 +31,7 @@ IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 #: The chosen numbers: where they live, what disables the rule (None: cannot be disabled), and the values that the
 #: leave-one-out choice may take.
 THRESHOLDS = {
-    "low points, share of the least height": (preparation, "_LOW_SHARE", 0.8, (0.6, 0.7, 0.8, 0.9)),
+    "low points, share of the least height": (preparation, "_LOW_SHARE", 0.9, (0.6, 0.7, 0.8, 0.9)),
     "rise of a crown above its roofs, cm": (block_cells, "_CROWN_RISE", 100_000, (100, 200, 250, 300, 100_000)),
     "step between a roof and its rim, cm": (block_cells, "_RIM_STEP", -100_000, (-100_000, 30, 50, 100)),
     "width of gaps, m": (block_cells, "_NARROW", 0.01, (0.01, 3.0, 4.0, 5.0, 6.0)),
