@@ -125,7 +125,7 @@ def _slab(slope: float, low: float, high: float, x0: float, x1: float) -> tuple[
     """Return the part of the interval [x0, x1) where ``low <= slope * x < high``."""
     if abs(slope) < 1e-12:
         return (x0, x1) if low <= 0.0 < high else (0.0, 0.0)
-    at_low, at_high = low / slope, high / slope
+    at_low, at_high = np.divide(low, slope), np.divide(high, slope)  # without a test for zero
     return max(x0, min(at_low, at_high)), min(x1, max(at_low, at_high))
 
 

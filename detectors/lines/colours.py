@@ -40,23 +40,30 @@ class Colours(NamedTuple):
     Attributes
     ----------
     values : ndarray of uint8 or uint16, shape (3, rows, columns)
-    full : float
-        Value of full brightness: 255 or 65535.
+    levels : ndarray of float64, shape (levels,)
+        Brightness of each value, 0..1.
     tenths : bool
         Whether the bins of all three histograms are 0.1 wide.
     """
 
     values: NDArray[np.uint8] | NDArray[np.uint16]
-    full: float
+    levels: NDArray[np.float64]
     tenths: bool = False
+
+    @classmethod
+    def of(cls, values: NDArray[np.uint8] | NDArray[np.uint16], *, tenths: bool = False) -> Colours:
+        """Return the colours of an image whose largest value is that of its type."""
+        full = int(np.iinfo(values.dtype).max)
+        return cls(values, np.arange(full + 1) / full, tenths)
 
 
 @kernel
 def yiq_bins(colours: Colours, row: int, column: int) -> tuple[int, int, int]:
     """Return the histogram bins of Y, I and Q of one cell."""
-    r = colours.values[0, row, column] / colours.full
-    g = colours.values[1, row, column] / colours.full
-    b = colours.values[2, row, column] / colours.full
+    at, across = np.uintp(row), np.uintp(column)  # unsigned: no index from the end
+    r = colours.levels[colours.values[0, at, across]]
+    g = colours.levels[colours.values[1, at, across]]
+    b = colours.levels[colours.values[2, at, across]]
     y = 0.299 * r + 0.587 * g + 0.114 * b
     i = 0.595716 * r - 0.274453 * g - 0.321263 * b
     q = 0.211456 * r - 0.522591 * g + 0.311135 * b

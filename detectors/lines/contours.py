@@ -129,19 +129,37 @@ def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float, sampl
     lies across (see `boxes`), for outer and inner outlines alike.
     """
     found, hierarchy = cv2.findContours(black, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    polylines: list[NDArray[np.float64]] = []
+    polylines: list[NDArray[np.int32]] = []
     shapes: list[int] = []
     least = shortest / gsd / math.sqrt(2)
+    parents = [] if hierarchy is None else hierarchy[0, :, 3].tolist()
     for index, contour in enumerate(found):
-        if len(contour) < least:
-            continue
-        if cv2.arcLength(contour, True) * gsd >= shortest:
-            parent = int(hierarchy[0, index, 3])
-            polylines.append(contour[::-1, 0, :] + 0.5)
-            shapes.append(index if parent < 0 else parent)
+        # A step is a pixel or a diagonal long.
+        if len(contour) >= least and (len(contour) * gsd >= shortest or cv2.arcLength(contour, True) * gsd >= shortest):
+            polylines.append(contour)
+            shapes.append(index if parents[index] < 0 else parents[index])
     offsets = np.cumsum([0, *map(len, polylines)], dtype=np.int64)
-    points = np.concatenate([np.empty((0, 2)), *polylines])
+    # Each outline is reversed: all of them are, and so is their order before.
+    points = np.concatenate([*polylines[::-1], np.empty((0, 1, 2), dtype=np.int32)])[::-1, 0] + 0.5
     return sample_curves(points, offsets, np.array(shapes, dtype=np.int64), closed=True, spacing=sample / gsd)
+
+
+@kernel
+def _padded(curve: NDArray[np.float64], reach: int, closed: bool) -> NDArray[np.float64]:
+    """Return a curve with `reach` points more at both ends: closed ones wrap around, open ones are mirrored."""
+    n = len(curve)
+    out = np.empty((n + 2 * reach, 2))
+    out[reach : reach + n] = curve
+    for outside in range(1, reach + 1):
+        before, after = reach - outside, reach + n - 1 + outside
+        for axis in range(2):
+            if closed:
+                out[before, axis] = curve[-outside % n, axis]
+                out[after, axis] = curve[(n - 1 + outside) % n, axis]
+            else:
+                out[before, axis] = 2 * curve[0, axis] - curve[min(outside, n - 1), axis]
+                out[after, axis] = 2 * curve[n - 1, axis] - curve[max(n - 1 - outside, 0), axis]
+    return out
 
 
 @kernel
@@ -150,23 +168,14 @@ def _convolve(
 ) -> NDArray[np.float64]:
     """Convolve each curve with an odd kernel; closed curves wrap around, open ones are mirrored at their ends."""
     out = np.zeros_like(points)
-    reach = len(kernel) // 2
     for i in range(len(offsets) - 1):
-        first, n = offsets[i], offsets[i + 1] - offsets[i]
-        for k in range(n):
-            for j in range(-reach, reach + 1):
-                at, end, sign = k + j, 0, 1.0
-                if closed:
-                    at %= n
-                elif at < 0:
-                    at, sign = min(-at, n - 1), -1.0
-                elif at >= n:
-                    at, end, sign = max(2 * (n - 1) - at, 0), n - 1, -1.0
-                for axis in range(2):
-                    value = points[first + at, axis]
-                    if sign < 0:
-                        value = 2 * points[first + end, axis] - value
-                    out[first + k, axis] += kernel[j + reach] * value
+        padded = _padded(points[offsets[i] : offsets[i + 1]], len(kernel) // 2, closed).ravel()
+        target = out[offsets[i] : offsets[i + 1]].ravel()
+        # A tap of the kernel at a time: the inner loop runs over neighbours in memory.
+        for j in range(len(kernel)):
+            tap, shift = kernel[j], 2 * j
+            for k in range(len(target)):
+                target[k] += tap * padded[k + shift]
     return out
 
 

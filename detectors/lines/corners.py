@@ -38,15 +38,26 @@ def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -
     """Return h_L(k) for every point of one curve, shape (n,); chords beyond the end of an open curve do not exist."""
     n = len(curve)
     out = np.zeros(n)
-    for start in range(n if closed else n - chord):
+    x, y = curve[:, 0].copy(), curve[:, 1].copy()
+    starts = n if closed else max(n - chord, 0)
+    dx, dy, norm = np.zeros(starts), np.zeros(starts), np.ones(starts)
+    for start in range(starts):
         end = (start + chord) % n
-        dx, dy = curve[end, 0] - curve[start, 0], curve[end, 1] - curve[start, 1]
-        norm = math.hypot(dx, dy)
-        if norm < 1e-9:
-            continue
-        for step in range(1, chord):
-            k = (start + step) % n
-            out[k] += ((curve[k, 0] - curve[start, 0]) * dy - (curve[k, 1] - curve[start, 1]) * dx) / norm
+        across, down = x[end] - x[start], y[end] - y[start]
+        length = math.hypot(across, down)
+        if length >= 1e-9:
+            dx[start], dy[start], norm[start] = across, down, length
+    # The inner loop runs over neighbours in memory, and each point adds up its chords in the order of their starts:
+    # those over the end of a closed curve last. np.divide has no test for zero, which would prevent vectorisation.
+    for step in range(chord - 1, 0, -1):
+        for start in range(min(starts, n - step)):
+            i, to = np.uintp(start), np.uintp(start) + np.uintp(step)  # unsigned: no index from the end
+            out[to] += np.divide((x[to] - x[i]) * dy[i] - (y[to] - y[i]) * dx[i], norm[i])
+    for step in range(chord - 1, 0, -1):
+        for k in range(starts + step - n):
+            start = n - step + k
+            aside = (x[k] - x[start]) * dy[start] - (y[k] - y[start]) * dx[start]
+            out[k] += np.divide(aside, norm[start])
     for k in range(n):
         out[k] = abs(out[k])
     return out
@@ -72,6 +83,13 @@ def _neighbours(corners: list[int], i: int, n: int, arm: int, closed: bool) -> t
     before = corners[i - 1] if i > 0 else 0
     after = corners[i + 1] if i + 1 < len(corners) else n - 1
     return before, after
+
+
+@kernel
+def _turn_at(curve: NDArray[np.float64], corners: list[int], i: int, arm: int, closed: bool) -> float:
+    """Return the angle by which the curve turns at corner i, degrees."""
+    before, after = _neighbours(corners, i, len(curve), arm, closed)
+    return float(_turn(curve, before, corners[i], after))
 
 
 @kernel
@@ -109,16 +127,21 @@ def corners_of_curve(
         if is_peak and strength[k] > product:
             corners.append(k)
     # The flattest corner is removed first, because that changes the angles of its neighbours.
+    turns = [_turn_at(curve, corners, i, chords[2], closed) for i in range(len(corners))]
     while len(corners) > 0:
         flattest, flattest_turn = -1, least_turn
         for i in range(len(corners)):
-            before, after = _neighbours(corners, i, n, chords[2], closed)
-            turn = _turn(curve, before, corners[i], after)
-            if turn < flattest_turn:
-                flattest, flattest_turn = i, turn
+            if turns[i] < flattest_turn:
+                flattest, flattest_turn = i, turns[i]
         if flattest < 0:
             break
         corners.pop(flattest)
+        turns.pop(flattest)
+        left = len(corners)
+        for i in range(left):
+            beside = i in (flattest - 1, flattest) or (closed and (i - flattest) % left in (0, left - 1))
+            if beside or (closed and left < 3):
+                turns[i] = _turn_at(curve, corners, i, chords[2], closed)
     return np.array(corners, dtype=np.int64)
 
 

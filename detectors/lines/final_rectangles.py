@@ -112,12 +112,11 @@ def strip_shares(
     """Return the least share in range over Y, I and Q, and the shares black in the primary and the secondary mask."""
     rows, columns = primary.shape
     across, down = max(1, round(strip[U1] - strip[U0])), max(1, round(strip[V1] - strip[V0]))
-    in_range = np.zeros(3, dtype=np.int64)
-    black, filled = 0, 0
+    of_y, of_i, of_q, black, filled = 0, 0, 0, 0, 0
     for i in range(across):
-        u = strip[U0] + (i + 0.5) * (strip[U1] - strip[U0]) / across
+        u = strip[U0] + np.divide((i + 0.5) * (strip[U1] - strip[U0]), across)  # without a test for zero
         for j in range(down):
-            v = strip[V0] + (j + 0.5) * (strip[V1] - strip[V0]) / down
+            v = strip[V0] + np.divide((j + 0.5) * (strip[V1] - strip[V0]), down)
             column = math.floor(strip[OX] + u * strip[UX] - v * strip[UY])
             row = math.floor(strip[OY] + u * strip[UY] + v * strip[UX])
             if not (0 <= row < rows and 0 <= column < columns):
@@ -125,11 +124,11 @@ def strip_shares(
             black += primary[row, column]
             filled += secondary[row, column]
             y_bin, i_bin, q_bin = yiq_bins(colours, row, column)
-            in_range[0] += within[0, y_bin]
-            in_range[1] += within[1, i_bin]
-            in_range[2] += within[2, q_bin]
+            of_y += within[0, np.uintp(y_bin)]
+            of_i += within[1, np.uintp(i_bin)]
+            of_q += within[2, np.uintp(q_bin)]
     samples = across * down
-    return min(in_range[0], in_range[1], in_range[2]) / samples, black / samples, filled / samples
+    return min(of_y, of_i, of_q) / samples, black / samples, filled / samples
 
 
 @kernel

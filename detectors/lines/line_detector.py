@@ -183,7 +183,7 @@ class LineDetector(LineParameters):
         rgb = image.values[:3] if bands == [0, 1, 2] else image.values[bands]
         if self.colour_smoothing > 0:
             rgb = np.stack([cv2.GaussianBlur(band, (3, 3), self.colour_smoothing) for band in rgb])
-        colours = Colours(rgb, float(np.iinfo(rgb.dtype).max), self.colour_bins == "tenths")
+        colours = Colours.of(rgb, tenths=self.colour_bins == "tenths")
         rough = self._roughness(points, points.z - ground, grid, spacing)
         return Rasters(image, masks, cover, colours, spacing, limit, scale, own_pixel, rough)
 

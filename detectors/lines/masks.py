@@ -34,6 +34,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
@@ -97,10 +98,11 @@ def pulse_spacing(points: PointCloud, grid: Grid) -> float:
     The square root of the area per first return in the median occupied cell; every point counts as a pulse when the
     cloud has no return numbers or no first returns.
     """
-    if points.return_number is not None and (points.return_number == 1).any():
-        points = points.take(points.return_number == 1)
+    x, y = points.x, points.y
+    if points.return_number is not None and (first := points.return_number == 1).any():
+        x, y = x[first], y[first]
     cell = 2 * _COVERAGE_CELL
-    counts = point_counts(points.x, points.y, Grid.covering(grid.extent, cell))
+    counts = point_counts(x, y, Grid.covering(grid.extent, cell))
     return spacing_of_counts(counts, cell, "median") or cell
 
 
@@ -179,36 +181,42 @@ def ground_correction(points: PointCloud, ground: NDArray[np.float64], share: fl
     known = np.isfinite(above)
     if not known.any():
         return np.zeros(len(points))
-    x, y = points.x[known], points.y[known]
+    x, y = (points.x, points.y) if known.all() else (points.x[known], points.y[known])
     grid = Grid.covering((x.min() - _CORRECTION_CELL, y.min() - _CORRECTION_CELL, x.max(), y.max()), _CORRECTION_CELL)
     cell = grid.cells(x, y)[0]
-    ordered = _sorted_in_cells(above[known], cell)
-    count = np.bincount(cell, minlength=grid.rows * grid.columns)
-    place = np.cumsum(count) - count + np.floor(share * count).astype(np.int64)
-    low = np.where(count > 0, np.minimum(ordered[np.minimum(place, len(ordered) - 1)], 0.0), 0.0)
-    lowest = cv2.erode(low.astype(np.float32).reshape(grid.shape), np.ones((3, 3), np.uint8))
+    allowed = np.floor(share * np.bincount(cell, minlength=grid.rows * grid.columns)).astype(np.int64)
+    low = _lowest(above[known].astype(np.float32), cell, allowed)
+    lowest = cv2.erode(low.reshape(grid.shape), np.ones((3, 3), np.uint8))
     return Elevation(lowest, grid).sample(points.x, points.y)
 
 
-def _sorted_in_cells(values: NDArray[np.float64], cell: NDArray[np.intp]) -> NDArray[np.float32]:
-    """Return the values in single precision, sorted by cell and then by value.
+@kernel
+def _lowest(above: NDArray[np.float32], cell: NDArray[np.intp], allowed: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return the lowest height of each cell after its `allowed` lowest ones, at most 0."""
+    ends = np.cumsum(allowed + 1)
+    lowest = np.zeros(ends[-1], dtype=np.float32)  # of each cell the allowed ones and the next, in rising order
+    for i in range(len(above)):
+        height, last = above[i], ends[cell[i]] - 1
+        first = last - allowed[cell[i]]
+        if height < lowest[last]:
+            place = last
+            while place > first and lowest[place - 1] > height:
+                lowest[place] = lowest[place - 1]
+                place -= 1
+            lowest[place] = height
+    return lowest[ends - 1]
 
-    Both are packed into one integer, because sorting integers is several times faster than sorting by two keys. The
-    bits of a float are in the order of its value when those of a negative one are inverted and the sign of others is.
-    """
-    bits = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
-    negative = bits >> np.uint32(31) > 0
-    rising = np.where(negative, ~bits, bits | np.uint32(1 << 31))
-    packed = np.sort(cell.astype(np.uint64) << np.uint64(32) | rising)
-    low = (packed & np.uint64(0xFFFFFFFF)).astype(np.uint32)
-    return np.where(low >> np.uint32(31) > 0, low & np.uint32(0x7FFFFFFF), ~low).view(np.float32)
 
-
-def _hits(points: PointCloud, chosen: NDArray[np.bool_], grid: Grid) -> NDArray[np.uint8]:
-    index, inside = grid.cells(points.x[chosen], points.y[chosen])
-    hits = np.zeros(grid.rows * grid.columns, dtype=np.uint8)
-    hits[index[inside]] = 1
-    return hits.reshape(grid.shape)
+def _hits(
+    points: PointCloud, thresholds: NDArray[np.float64], grid: Grid
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return the pixels with a point below its threshold, and those with one above."""
+    index, inside = grid.cells(points.x, points.y)
+    hits = np.zeros((2, grid.rows * grid.columns), dtype=np.uint8)
+    hits[0, index[inside & (points.z < thresholds)]] = 1
+    hits[1, index[inside & (points.z > thresholds)]] = 1
+    low, high = hits.reshape(2, *grid.shape)
+    return low, high
 
 
 def _squares(hits: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
@@ -263,7 +271,7 @@ def build_masks(
     """
     side = 2 * max(0, round((neighbourhood / grid.gsd - 1) / 2)) + 1
     coverage = _coverage(points, grid)
-    low, high = _hits(points, points.z < thresholds, grid), _hits(points, points.z > thresholds, grid)
+    low, high = _hits(points, thresholds, grid)
     secondary = _squares(high, side)
     if nearest:
         primary, filled = _nearest(low, high, neighbourhood / grid.gsd)
@@ -296,10 +304,7 @@ def build_cell_masks(
     cells = Grid.covering(grid.extent, _MASK_CELL)
     side = 2 * round(max(0.5, 0.5 * math.floor(2 * spacing + 0.5)) / _MASK_CELL - 1) + 1
     places = np.ix_(*_places(grid, cells))
-    white, secondary = (
-        _squares(_hits(points, chosen, cells), side)[places]
-        for chosen in (points.z < thresholds, points.z > thresholds)
-    )
+    white, secondary = (_squares(hits, side)[places] for hits in _hits(points, thresholds, cells))
     coverage = _coverage(points, grid)
     primary = np.subtract(1, white, dtype=np.uint8)
     if clip:

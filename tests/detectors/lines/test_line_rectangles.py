@@ -231,7 +231,7 @@ def test_dominant_bins_of_histograms_worked_by_hand(histogram, expected):
 
 def test_colours_fall_into_the_bins_of_their_yiq():
     def bins(*rgb):
-        return yiq_bins(Colours(np.array(rgb, np.uint8).reshape(3, 1, 1), 255.0), 0, 0)
+        return yiq_bins(Colours.of(np.array(rgb, np.uint8).reshape(3, 1, 1)), 0, 0)
 
     assert bins(0, 0, 0) == (0, 10, 10)
     assert bins(255, 255, 255) == (9, 10, 10)
@@ -244,7 +244,7 @@ def two_coloured():
     values = np.empty((3, 60, 100), np.uint8)
     values[:] = np.array([180, 60, 50])[:, None, None]
     values[:, :, 60:] = np.array([60, 60, 180])[:, None, None]
-    return Colours(values, 255.0)
+    return Colours.of(values)
 
 
 def test_a_side_is_extended_as_far_as_the_colour_of_the_roof_reaches():
@@ -257,7 +257,7 @@ def test_a_side_is_extended_as_far_as_the_colour_of_the_roof_reaches():
 
 
 def test_a_side_ends_where_the_primary_mask_is_black_again_after_a_gap():
-    colours = Colours(np.full((3, 60, 100), 99, np.uint8), 255.0)
+    colours = Colours.of(np.full((3, 60, 100), 99, np.uint8))
     secondary = np.ones((60, 100), np.uint8)
     primary = secondary.copy()
     primary[:, 50:54] = 0

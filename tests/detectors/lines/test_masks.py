@@ -5,7 +5,7 @@ import pytest
 from naive import lines as naive_lines
 
 from roofbench.detectors.lines.masks import (
-    _sorted_in_cells,
+    _lowest,
     build_masks,
     ground_correction,
     ground_heights,
@@ -190,9 +190,12 @@ def test_no_more_than_the_share_of_the_points_of_a_cell_lie_below_the_corrected_
         assert value == pytest.approx(step[int(y // 4), int(x // 4)], abs=1e-5)
 
 
-def test_heights_are_sorted_within_cells_as_by_two_keys():
-    rng = np.random.default_rng(11)
-    values = np.concatenate([rng.normal(0, 3, 400), [0.0, -0.0, 1e-8, -1e-8]])
-    cell = rng.integers(0, 12, len(values))
-    expected = values.astype(np.float32)[np.lexsort((values.astype(np.float32), cell))]
-    np.testing.assert_array_equal(_sorted_in_cells(values, cell), expected)
+def test_the_lowest_heights_of_cells_are_those_of_sorted_ones():
+    rng = np.random.default_rng(3)
+    heights = np.concatenate([rng.normal(0, 3, 400), [0.0, -0.0, 1e-8, -1e-8]]).astype(np.float32)
+    cell = rng.integers(0, 12, len(heights))
+    allowed = rng.integers(0, 10, 14)  # two cells are empty
+    expected = [
+        min([*np.sort(heights[cell == number]), *[0.0] * 10][count], 0.0) for number, count in enumerate(allowed)
+    ]
+    np.testing.assert_array_equal(_lowest(heights, cell, allowed), np.array(expected, dtype=np.float32))

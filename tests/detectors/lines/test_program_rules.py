@@ -28,7 +28,7 @@ RULES = FinalRules(0.0, 0.97, 0.9, 2.0, 2.0, 0.4, 0.9, 0.1, 0.0, False)
 
 
 def grey(rows=60, columns=100):
-    return Colours(np.full((3, rows, columns), 99, np.uint8), 255.0)
+    return Colours.of(np.full((3, rows, columns), 99, np.uint8))
 
 
 @pytest.mark.parametrize(("spacing", "side"), [(0.3, 3), (0.5, 3), (0.7, 3), (1.0, 7), (1.5, 11)])
@@ -54,7 +54,7 @@ def test_masks_of_cells_cover_the_same_area_on_any_image():
 def test_bins_of_a_tenth_follow_the_definition():
     rng = np.random.default_rng(1)
     for red, green, blue in [(255, 0, 0), (0, 255, 0), (0, 0, 255), *rng.integers(0, 256, (50, 3))]:
-        found = yiq_bins(Colours(np.array([red, green, blue], np.uint8).reshape(3, 1, 1), 255.0, True), 0, 0)
+        found = yiq_bins(Colours.of(np.array([red, green, blue], np.uint8).reshape(3, 1, 1), tenths=True), 0, 0)
         yiq = np.array([[0.299, 0.587, 0.114], [0.595716, -0.274453, -0.321263], [0.211456, -0.522591, 0.311135]])
         y, i, q = yiq @ (np.array([red, green, blue]) / 255)
         assert found == (min(int(10 * y), 9), int(np.floor(10 * i)) + 6, int(np.floor(10 * q)) + 6)
