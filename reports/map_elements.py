@@ -39,8 +39,8 @@ def add_scale_bar(axes: Axes, *, unit: float = 1.0) -> None:
     axes.add_patch(bar)
     label = f"{length / 1000:g} km" if length >= 1000 else f"{length:g} m"
     background = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.5}
-    middle = x + length / unit / 2
-    axes.text(middle, y + 0.02 * height, label, ha="center", va="bottom", fontsize=9, zorder=6, bbox=background)
+    # Left-aligned: on a narrow map the label is longer than the bar, and would cross the frame.
+    axes.text(x, y + 0.02 * height, label, ha="left", va="bottom", fontsize=9, zorder=6, bbox=background)
 
 
 def polygon_paths(polygons: Iterable[Any]) -> Iterator[Path]:

@@ -67,7 +67,9 @@ def objects_line(found: PairedComparison) -> str:
     """Return what McNemar's test says, in words."""
     if found.p_value is None:
         return found.conclusion
-    return f"McNemar's exact test of the objects that one alone finds: p = {found.p_value:.2g}, {found.conclusion}"
+    return (
+        f"McNemar's exact test of the objects found by only one of the two: p = {found.p_value:.2g}, {found.conclusion}"
+    )
 
 
 def fates_table(found: PairedComparison) -> Table:

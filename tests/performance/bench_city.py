@@ -78,6 +78,9 @@ def processor_time():
     return used.ru_utime + used.ru_stime
 
 
+#: Names of the modes in the plot.
+LABELS = {"jobs1": "1 job", "jobs2": "2 jobs", "dask": "Dask"}
+
 #: What a child runs: a city, whose numbers it prints as JSON.
 CHILD = """
 import json, sys
@@ -221,12 +224,15 @@ def plot(rows, path):
             (int(row["copies"]), float(row["seconds"]), float(row["worker_mb"])) for row in rows if row["mode"] == mode
         )
         copies, seconds, memory = zip(*own, strict=True)
-        left.loglog(copies, seconds, "o-", label=mode)
-        right.loglog(copies, memory, "o-", label=mode)
+        left.loglog(copies, seconds, "o-", label=LABELS.get(mode, mode))
+        right.loglog(copies, memory, "o-", label=LABELS.get(mode, mode))
     copies, seconds = zip(*sorted((int(row["copies"]), float(row["seconds"])) for row in rows), strict=True)
     left.loglog(copies, [seconds[-1] * n / copies[-1] for n in copies], "k:", label="equal time per copy")
     left.set(xlabel="copies of the scene", ylabel="time, s")
-    right.set(xlabel="copies of the scene", ylabel="highest memory of a worker, MB")
+    right.set(xlabel="copies of the scene", ylabel="highest memory of a worker, MB", yscale="linear")
+    right.set_ylim(bottom=0)
+    for axis in (left.xaxis, right.xaxis, left.yaxis):
+        axis.set_major_formatter("{x:g}")
     left.legend()
     figure.savefig(path, dpi=150)
 

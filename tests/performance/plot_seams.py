@@ -57,8 +57,8 @@ def draw(axes, parts, result, truth, title):
             np.array([west, east, east, west, west]) - WEST, np.array([south, south, north, north, south]) - SOUTH,
             color="tab:red", linewidth=0.6, linestyle="--",
         )  # fmt: skip
-    axes[0].set_title(f"{title}: found by each tile (hatched: cut by the rim of a halo; dotted: spare)", fontsize=9)
-    axes[1].set_title(f"result: {len(result)} footprints (red: truth)", fontsize=9)
+    axes[0].set_title(f"{title}: found by each tile (hatched: cut by its halo; dotted: in reserve)", fontsize=9)
+    axes[1].set_title(f"result: {len(result)} footprints (red: reference)", fontsize=9)
     for one in axes:
         for x in np.arange(WEST // TILE * TILE, WEST + 401, TILE) - WEST:
             one.axvline(x, color="0.5", linewidth=0.5)
