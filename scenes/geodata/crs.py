@@ -31,6 +31,7 @@ __all__ = [
     "require_metric",
     "same_crs",
     "scale_warning",
+    "unusable",
 ]
 
 #: Largest deviation of mapped from true areas that passes without a warning; national grids stay below a tenth of it.
@@ -73,9 +74,22 @@ def crs_text(crs: CRS) -> str:
     return ":".join(authority) if authority else text
 
 
-def file_crs(crs: CRS) -> str | None:
-    """Return the text of the CRS of a file; None for a local or undefined system, which does not locate anything."""
-    return None if _horizontal(crs.to_wkt()).is_engineering else crs_text(crs)
+def file_crs(crs: CRS, where: str = "the input") -> str | None:
+    """Return the text of the CRS of a file; None for a local or undefined system, which does not locate anything.
+
+    Raises
+    ------
+    CRSError
+        A local system in other units than metres: they stay what they are in any place.
+    """
+    horizontal = _horizontal(crs.to_wkt())
+    if not horizontal.is_engineering:
+        return crs_text(crs)
+    foreign = [axis.unit_name for axis in horizontal.axis_info if abs(axis.unit_conversion_factor - 1.0) > 1e-9]
+    # Undefined systems of GeoPackage and GeoJSON are in degrees or unknown units.
+    if foreign and not {"degree", "unknown"} & set(foreign):
+        raise CRSError(f"{where}: its local system is in {foreign[0]}, metres are needed: convert the coordinates")
+    return None
 
 
 @lru_cache(maxsize=64)
@@ -157,11 +171,11 @@ def misfit(text: str, bounds: Sequence[float]) -> str | None:
     crs = _horizontal(text)
     if crs.is_geographic:
         return "is geographic (degrees), which its coordinates cannot be" if max(map(abs, bounds)) > 360 else None
-    return None if crs.is_geocentric else _unusable(text)
+    return None if crs.is_geocentric else unusable(text)
 
 
 @lru_cache(maxsize=64)
-def _unusable(text: str) -> str | None:
+def unusable(text: str) -> str | None:
     """Return why coordinates of a system are neither degrees nor on a map; None when they are."""
     import pyproj
     from pyproj.exceptions import CRSError as ProjError
@@ -205,7 +219,7 @@ def require_metric(text: str | None, where: str, *, heights: bool = True, remedy
     if text is None:
         return
     crs = _horizontal(text)
-    reason = _unusable(text)
+    reason = unusable(text)
     if reason is not None:
         raise CRSError(f"{where}: {crs_label(text)} {reason}: {remedy or _REPROJECT + ', or set its true CRS by crs='}")
     if crs.is_geographic:
@@ -248,6 +262,7 @@ def scale_warning(text: str | None, x: float, y: float) -> str | None:
         scale = projection.get_factors(*projection(x, y, inverse=True)).areal_scale
     except ProjError:
         return None  # outside the domain of the projection
+    scale = abs(scale)  # systems that count westwards or southwards are mirrored
     if not math.isfinite(scale) or abs(scale - 1.0) <= _AREA_TOLERANCE:
         return None
     return (

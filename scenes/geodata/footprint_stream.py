@@ -208,7 +208,7 @@ def _parquet_parts(file: Path) -> tuple[str | None, str | None, int, Any, str]:
         raise InputError(
             f"{file}: its geometry is encoded as {encoding}, and only WKB is read in parts: rewrite it as WKB"
         )
-    return None if parsed is None else file_crs(parsed), None, count, schema, geometry
+    return None if parsed is None else file_crs(parsed, str(file)), None, count, schema, geometry
 
 
 def _ogr_parts(file: Path, layer: str | None) -> tuple[str | None, str | None, int, Any, str]:
@@ -226,4 +226,4 @@ def _ogr_parts(file: Path, layer: str | None) -> tuple[str | None, str | None, i
     geometry = meta["geometry_name"] or "wkb_geometry"
     if geometry not in schema.names:
         raise InputError(f"{file}: no polygons: the layer {name!r} has no geometry")
-    return None if meta["crs"] is None else named_or_none(meta["crs"]), name, count, schema, geometry
+    return None if meta["crs"] is None else named_or_none(meta["crs"], str(file)), name, count, schema, geometry

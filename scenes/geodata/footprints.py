@@ -184,7 +184,7 @@ class Footprints(Displayed):
                 f"{source}: no column {building_id!r}{nearest_hint(building_id, columns)}; "
                 f"it has {', '.join(columns) or 'none'}"
             )
-        own = None if frame.crs is None else file_crs(frame.crs)
+        own = None if frame.crs is None else file_crs(frame.crs, source)
         return cls.of(
             geometry.to_numpy(),
             building_ids=None if building_id is None else columns[building_id],

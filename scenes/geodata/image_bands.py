@@ -69,24 +69,42 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
             f"{header.path} has {header.band_count} bands, expected 1 (grey), 3 (red, green, blue) or 4 (and nir): "
             "name them by bands=, - to skip one"
         )
-    return _DEFAULT_BANDS[header.band_count]
+    names = _DEFAULT_BANDS[header.band_count]
+    shown = [colour if colour in ("red", "green", "blue") else "" for colour in header.colours]
+    for found in (described, shown):
+        wrong = [band for band, name in enumerate(found) if name and header.band_count > 1 and name != names[band]]
+        if wrong:
+            raise InputError(
+                f"{header.path} says that its band {wrong[0] + 1} is {found[wrong[0]]}, and does not name all others: "
+                f"name them by bands=, such as {','.join(names)}, - to skip one"
+            )
+    return names
 
 
 def _names_by_colour(colours: Sequence[str]) -> tuple[str, ...] | None:
-    """Return names by colour interpretation, a fourth band of no colour as near infrared; None when they do not do."""
+    """Return names by colour interpretation, one band of no colour as near infrared; None when they do not do."""
     names = tuple({"gray": "grey", "undefined": "nir"}.get(colour, colour) for colour in colours)
-    return names if sorted(names) in (["blue", "green", "red"], ["blue", "green", "nir", "red"]) else None
+    known = (["blue", "green", "red"], ["blue", "green", "nir", "red"], ["green", "nir", "red"])
+    return names if sorted(names) in known else None
 
 
 def assumed_bands(header: RasterHeader, bands: Sequence[str] | None) -> str | None:
     """Return a note on names of bands that the file does not give; None when it gives all of them."""
     names = band_names(header, bands)
-    if bands is not None or names == tuple(map(_described, header.band_names)) or len(names) == 1:
+    if bands is not None or len(names) == 1:
         return None
+    if names == tuple(map(_described, header.band_names)):
+        by_colour = _names_by_colour(header.colours)
+        if by_colour in (None, names):
+            return None
+        return (
+            f"{header.path.name} describes its bands as {', '.join(names)} and marks them as {', '.join(by_colour)}: "
+            "the descriptions were used"
+        )
     texts = [text for text in header.band_names if text and not _NUMBER.fullmatch(text)]
     if texts:
         return (
-            f"{header.path.name} describes its bands as {', '.join(map(repr, texts))}, which are not colour names: "
+            f"{header.path.name} describes its bands as {', '.join(map(repr, texts))}, which names not all colours: "
             f"they were taken for {', '.join(names)}"
         )
     if _names_by_colour(header.colours) is None:
@@ -104,6 +122,8 @@ def _described(text: str) -> str:
     ('red', '', '')
     """
     words = set(re.findall(r"[^\W\d_]+", text.lower()))
+    if {"infra", "near"} & words and "red" in words:
+        return "nir"
     if words & _SHADES or "short" in words:
         return ""
     if len(words) == 1 and text.strip().lower() in _LETTERS:

@@ -46,6 +46,8 @@ __all__ = ["LasHeader", "read_chunks", "read_las_header", "read_points", "write_
 
 #: Name under which point files are written.
 _SOFTWARE = "roofbench"
+#: Largest coordinate, metres; beyond it a header is broken.
+_LARGEST = 1e9
 #: Points unpacked at a time; about 100 MB with the scaled coordinates.
 CHUNK = 1_000_000
 
@@ -116,8 +118,9 @@ def read_las_header(path: str | os.PathLike[str], *, crs: str | None = None, fal
             )
         refuse_counts(file, header)
         bounds = tuple(float(value) for value in (*header.mins, *header.maxs))
-        if not np.isfinite(bounds).all():
-            raise InputError(f"{file}: the bounds in its header, {bounds}, are not finite: export it again")
+        if not (np.abs(bounds) <= _LARGEST).all():
+            shown = ", ".join(f"{value:.9g}" for value in bounds)
+            raise InputError(f"{file}: the bounds in its header, ({shown}), are not finite: export it again")
         if not any(bounds):
             raise InputError(
                 f"{file}: the bounds in its header are all 0: write the header anew, for instance with lasinfo "

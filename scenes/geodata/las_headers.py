@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import CRSError, InputError
-from .crs import crs_label, file_crs, misfit, require_metric
+from .crs import crs_label, file_crs, height_unit, misfit, require_metric
 from .geo_keys import foreign_units, is_user_defined, user_defined_crs
 
 __all__ = [
@@ -24,6 +24,8 @@ __all__ = [
 HEADER_BYTES = 375
 #: Versions that are read: major, and minor numbers.
 _MAJOR, _MINORS = 1, range(5)
+#: Largest number of a point format.
+_LAST_FORMAT = 10
 #: Compressor in the record of LASzip: one stream of points, without chunks.
 _POINTWISE = b"\x01\x00"
 #: How point files get another CRS.
@@ -36,6 +38,12 @@ def refuse_version(file: Path, head: bytes) -> None:
         raise InputError(
             f"{file} is of LAS version {head[24]}.{head[25]}, versions 1.0 to 1.4 are read: write it as LAS 1.4, for "
             "instance with pdal, or copy it again if that is not its version"
+        )
+    # The two highest bits mark compression.
+    if len(head) > 104 and head[104] & 0x3F > _LAST_FORMAT:
+        raise InputError(
+            f"{file} has points of format {head[104] & 0x3F}, formats 0 to {_LAST_FORMAT} are read: copy or download "
+            "it again"
         )
 
 
@@ -111,22 +119,25 @@ def header_crs(file: Path, header: Any, fallback: str | None) -> str | None:
         else:
             crs, reason = header.parse_crs(), None
     except ProjError as error:
-        crs, reason = None, str(error)
+        crs, reason = None, " ".join(str(error).split())[:150]
     if crs is None and reason is None:
         return None
     if crs is None:
         if fallback is not None:
             return fallback
         raise CRSError(f"{file}: its CRS record cannot be read ({reason}): name the CRS by crs=")
-    text = file_crs(crs)
-    wrong = None if text is None else misfit(text, [*header.mins[:2], *header.maxs[:2]])
+    of_heights = height_unit(crs)
+    if of_heights is not None:  # feet stay feet wherever the points are
+        raise CRSError(f"{file}: its heights are in {of_heights}, metres are needed: {_REPROJECT}")
+    horizontal = file_crs(crs, str(file))
+    wrong = None if horizontal is None else misfit(horizontal, [*header.mins[:2], *header.maxs[:2]])
     if wrong is not None:
         if fallback is not None:
             return fallback
-        raise CRSError(f"{file}: {crs_label(text)} {wrong}: name the true CRS by crs=")
-    if text is not None:
+        raise CRSError(f"{file}: {crs_label(horizontal)} {wrong}: name the true CRS by crs=")
+    if horizontal is not None:
         require_metric(crs.to_wkt(), str(file), remedy=_REPROJECT)
-    return text
+    return horizontal
 
 
 def _keys(header: Any) -> list[Any]:

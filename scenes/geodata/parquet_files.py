@@ -55,7 +55,7 @@ def read_parquet(
             if values.dtype.kind == "O":
                 values = np.where(frame[name].isna(), None, values)
             columns[str(name)] = values
-    crs = None if frame.crs is None else file_crs(frame.crs)
+    crs = None if frame.crs is None else file_crs(frame.crs, str(file))
     return np.asarray(frame.geometry.array, dtype=object), columns, crs, []
 
 
@@ -83,7 +83,7 @@ def _read_parts(
     # A missing CRS is that of RFC 7946, as the standard says; null is none.
     named = described.get("crs", "OGC:CRS84")
     try:
-        crs = None if named is None else file_crs(pyproj.CRS.from_user_input(named))
+        crs = None if named is None else file_crs(pyproj.CRS.from_user_input(named), str(file))
     except ProjError as error:
         if needs_crs:
             raise CRSError(f"{file}: its CRS cannot be read ({error}): name the CRS by crs=") from error

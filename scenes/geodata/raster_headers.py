@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import CRSError, InputError
-from .crs import file_crs, height_unit
+from .crs import crs_label, file_crs, height_unit, unusable
 from .opened_rasters import opened
 from .raster import Grid
 
@@ -26,7 +26,12 @@ __all__ = ["RasterHeader", "read_raster_header", "source_crs"]
 #: Colours of models other than RGB.
 _OTHER_COLOURS = {"hue", "saturation", "lightness", "cyan", "magenta", "yellow", "black", "Y", "Cb", "Cr"}
 #: Units of heights that are metres, whatever follows: ``m (NAVD88)``, ``metres above sea level``, ``[m]``, ``masl``.
-_METRES = re.compile(r"\W*(m|met(er|re)s?|masl)(?![\w*/^])", re.IGNORECASE)
+_METRES = re.compile(
+    r"\W*(m|met(er|re|ro|ri)s?|m[eè]tres?|masl)(?![\w*/^])|(?!us|ft|f[eo][eo]t)[^\W\d_]+\s+(in\s+)?[(\[]?(m|met(er|re)s?)[\])]?$",
+    re.IGNORECASE,
+)
+#: Words of descriptions of masks.
+_MASKS = {"alpha", "mask", "maske", "masque", "transparency", "opacity"}
 #: Words that name no unit.
 _NO_UNIT = ("", "unknown", "none", "undefined", "n/a", "-")
 #: Largest coordinate and smallest pixel of an image, in its unit; beyond them a header is broken.
@@ -61,7 +66,9 @@ class RasterHeader:
     alpha : bool
         Whether a further, last band is marked as alpha. Many programs mark near infrared so.
     mask_band : bool
-        Whether a further, last band without a name holds a mask: one value beside 0, the highest or 1.
+        Whether a further, last band without a colour holds a mask: it is described so, or has one value beside 0.
+    mask_named : bool
+        Whether that is by its description.
     depth : int, optional
         Bits of each value, where the file names fewer than its type has.
     """
@@ -79,6 +86,7 @@ class RasterHeader:
     offset: float
     alpha: bool = False
     mask_band: bool = False
+    mask_named: bool = False
     depth: int | None = None
 
 
@@ -162,6 +170,7 @@ def read_raster_header(path: str | os.PathLike[str], *, crs: str | None = None) 
             offset=source.offsets[0],
             alpha=count < len(colours) and colours[-1].name == "alpha",
             mask_band=mask_band,
+            mask_named=_named_mask(source),
             depth=_depth(source),
         )
 
@@ -175,7 +184,14 @@ def source_crs(file: Path, source: Any) -> str | None:
         crs = CRS.from_wkt(source.crs.to_wkt())
     except ProjError as error:
         raise CRSError(f"{file}: its CRS cannot be read ({error}): set it with gdal_edit.py -a_srs") from error
-    return file_crs(crs)
+    text = file_crs(crs, str(file))
+    reason = None if text is None else unusable(text)
+    if text is not None and reason is not None:
+        raise CRSError(
+            f"{file}: {crs_label(text)} {reason}: reproject it, for instance with gdalwarp -t_srs, or set its true CRS "
+            "with gdal_edit.py -a_srs"
+        )
+    return text
 
 
 def _depth(source: Any) -> int | None:
@@ -199,10 +215,21 @@ def _height_unit(source: Any) -> str | None:
         return None
 
 
+def _named_mask(source: Any) -> bool:
+    """Return whether the last of several bands is described as a mask, and not marked as one."""
+    words = set(re.findall(r"[^\W\d_]+", (source.descriptions[-1] or "").lower()))
+    return source.count > 1 and source.colorinterp[-1].name == "undefined" and bool(words & _MASKS)
+
+
 def _holds_mask(source: Any) -> bool:
-    """Return whether the fourth band, unnamed and of no colour, holds 0 and one more value: no infrared does."""
+    """Return whether the last band is named as a mask, or the fourth, unnamed and of no colour, holds 0 and one value.
+
+    No infrared has two values only.
+    """
     from rasterio.windows import Window
 
+    if _named_mask(source):
+        return True
     if source.count != 4 or source.colorinterp[3].name != "undefined" or source.descriptions[3]:
         return False
     if source.dtypes[3] not in ("uint8", "uint16"):

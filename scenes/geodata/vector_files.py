@@ -308,12 +308,12 @@ def _read_ogr(
     if file.suffix.lower() == ".shp" and "building_i" in columns:
         columns["building_id"] = columns.pop("building_i")  # a Shapefile keeps ten letters of a name
     geometries, closed = geometries_of_wkb(found.wkb, file)
-    return geometries, columns, None if found.crs is None else named_or_none(found.crs), closed
+    return geometries, columns, None if found.crs is None else named_or_none(found.crs, str(file)), closed
 
 
-def named_or_none(crs: str) -> str | None:
+def named_or_none(crs: str, where: str) -> str | None:
     """Return the CRS of a file as it is; None for a local or undefined one."""
-    return crs if crs.upper().startswith("EPSG:") else crs if file_crs(parse_crs(crs)) is not None else None
+    return crs if crs.upper().startswith("EPSG:") else crs if file_crs(parse_crs(crs), where) is not None else None
 
 
 def write_ogr(

@@ -30,7 +30,13 @@ def geometries_of_wkb(wkb: NDArray[np.object_], file: Path) -> tuple[NDArray[np.
     """Return geometries of WKB; rings that end elsewhere than they began are closed and reported."""
     closed = []
     with np.errstate(invalid="ignore"):  # coordinates that are NaN: left out and reported by Footprints.of
-        geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
+        try:
+            geometries = np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
+        except NotImplementedError as error:
+            raise InputError(
+                f"{file}: the outline of feature {_first_curve(wkb)} is a curve: convert it to straight lines, for "
+                "instance with ogr2ogr -nlt CONVERT_TO_LINEAR"
+            ) from error
         unread = [row for row in np.flatnonzero(shapely.is_missing(geometries)) if wkb[row] is not None]
         for row in unread:
             if isinstance(wkb[row], str):
@@ -50,6 +56,16 @@ def geometries_of_wkb(wkb: NDArray[np.object_], file: Path) -> tuple[NDArray[np.
                 )
             closed.append(Repair(int(row), "a ring that is not closed", "repaired"))
     return geometries, closed
+
+
+def _first_curve(wkb: NDArray[np.object_]) -> int:
+    """Return the row of the first geometry whose type GEOS knows and shapely does not pass on."""
+    for row, one in enumerate(wkb):
+        try:
+            shapely.from_wkb(one, on_invalid="ignore")
+        except NotImplementedError:
+            return row
+    return 0
 
 
 def _with_polygons(wkb: bytes) -> bytes:

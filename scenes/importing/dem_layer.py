@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.wording import counted
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation
 from ..geodata.raster_headers import RasterHeader
@@ -81,7 +82,9 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
         why = ", since no point is classified as ground" if ground_filter is None else ""
         how = f"by a ground filter (progressive opening){why}"
     if not np.isfinite(dem.values).any():
-        place.log.note(f"no DEM was derived: {len(points)} points are too few or lie too closely together")
+        place.log.note(
+            f"no DEM was derived: {counted(len(points), 'point is', 'points are')} too few or too close to each other"
+        )
         return None
     how = place.log.derived["dem"] = f"{how}, at {dem.grid.gsd:g} m"
     place.log.note(f"the DEM was derived {how}")

@@ -44,7 +44,7 @@ def image_of(
             f"{file_names(marked)}: the last band is marked as alpha and was taken for the mask, but holds many "
             "values: if it is near infrared, name the bands: red,green,blue,nir"
         )
-    if bands is None and (masked := [header.path for header in images if header.mask_band]):
+    if bands is None and (masked := [header.path for header in images if header.mask_band and not header.mask_named]):
         place.log.note(
             f"{file_names(masked)}: the fourth band holds 0 and one other value and was taken for the mask: if it is "
             "near infrared, name the bands: red,green,blue,nir"

@@ -78,6 +78,7 @@ def test_systems_that_stretch_areas_are_warned_of():
     assert scale_warning("EPSG:3857", 1e6, 0.0) is None, "true at the equator"
     assert scale_warning("EPSG:25832", 5e5, 5.5e6) is None
     assert scale_warning("EPSG:28992", 84900, 447500) is None
+    assert scale_warning("EPSG:5514", -700_000, -1_000_000) is None, "mirrored, as PROJ has it"
     assert scale_warning("EPSG:25833", -1e12, 5.5e6) is None, "nothing is known so far away"
     assert scale_warning(None, 0.0, 0.0) is None
 
@@ -116,3 +117,10 @@ def test_systems_that_are_no_map_are_refused_with_a_reason(text, reason):
 def test_a_local_system_in_a_file_locates_nothing():
     assert file_crs(pyproj.CRS.from_wkt(LOCAL)) is None
     assert file_crs(pyproj.CRS.from_epsg(25832)) == "EPSG:25832"
+
+
+@pytest.mark.parametrize("unit", ['"foot",0.3048', '"centimetre",0.01'])
+def test_a_local_system_in_other_units_than_metres_is_refused(unit):
+    name = unit.split('"')[1]
+    with pytest.raises(CRSError, match=rf"a\.tif: its local system is in {name}"):
+        file_crs(pyproj.CRS.from_wkt(f'LOCAL_CS["unnamed",UNIT[{unit}]]'), "a.tif")

@@ -293,3 +293,26 @@ def test_chunks_of_varying_numbers_of_points_are_read(tmp_path):
         assert chunk_size(reader.header) is None
     one, two = read_points(tmp_path / "b.laz"), read_points(file)
     assert (one.x.tolist(), one.z.tolist()) == (two.x.tolist(), two.z.tolist())
+
+
+@pytest.mark.parametrize(
+    "wkt",
+    [
+        'LOCAL_CS["unnamed",UNIT["foot",0.3048]]',
+        'COMPD_CS["x",LOCAL_CS["a",UNIT["metre",1]],VERT_CS["h",VERT_DATUM["d",2005],UNIT["foot",0.3048]]]',
+        pyproj.CRS("EPSG:6360").to_wkt(),
+    ],
+    ids=["local", "local with heights", "heights alone"],
+)
+def test_feet_stay_feet_whatever_crs_is_given(tmp_path, wkt):
+    with pytest.raises(CRSError, match=r"in (US survey )?foot"):
+        read_las_header(write(tmp_path / "a.las", wkt=wkt), fallback="EPSG:25832")
+
+
+def test_a_point_format_that_does_not_exist_is_refused_by_its_number(tmp_path):
+    file = write(tmp_path / "a.las", version="1.2")
+    content = bytearray(file.read_bytes())
+    content[104] = 77
+    file.write_bytes(content)
+    with pytest.raises(InputError, match="has points of format 13, formats 0 to 10 are read"):
+        read_las_header(file)

@@ -8,7 +8,7 @@ from rasterio.control import GroundControlPoint
 from rasterio.enums import ColorInterp
 from rasterio.warp import transform as transform_points
 
-from roofbench.core.errors import InputError
+from roofbench.core.errors import CRSError, InputError
 from roofbench.scenes.geodata.image_bands import assumed_bands, band_names
 from roofbench.scenes.geodata.raster import Grid
 from roofbench.scenes.geodata.raster_files import read_image
@@ -228,11 +228,59 @@ def test_descriptions_name_the_bands_in_other_words(tmp_path, texts, names):
 
 
 def test_descriptions_that_name_no_colour_are_noted(tmp_path):
-    with rasterio.open(raster(tmp_path / "a.tif", levels=(200, 100, 50)).path, "r+") as target:
-        target.descriptions = ("red edge", "red", "green")
+    with rasterio.open(raster(tmp_path / "a.tif", levels=(200, 100, 50, 30)).path, "r+") as target:
+        target.descriptions = ("red", "green", "blue", "red edge")
     note = assumed_bands(read_raster_header(tmp_path / "a.tif"), None)
     assert note is not None
     assert "'red edge'" in note
+
+
+@pytest.mark.parametrize(
+    ("texts", "colours"),
+    [
+        (("red edge", "red", "green"), None),
+        (("SWIR", "NIR", "Red", "Green"), None),
+        (("Red", "Red", "Green", "Blue"), None),
+        (None, ("red", "red", "green")),
+    ],
+)
+def test_bands_are_not_assumed_against_what_some_of_them_are_named(tmp_path, texts, colours):
+    levels = (200, 100, 50, 30)[: len(texts or colours)]
+    with rasterio.open(raster(tmp_path / "a.tif", levels=levels, colours=colours).path, "r+") as target:
+        if texts:
+            target.descriptions = texts
+    with pytest.raises(InputError, match=r"says that its band \d is (red|nir|green), and does not name all others"):
+        band_names(read_raster_header(tmp_path / "a.tif"), None)
+
+
+@pytest.mark.parametrize("text", ["Alpha", "mask", "Transparency (0-255)"])
+def test_a_band_that_is_described_as_mask_is_one(tmp_path, text):
+    names = ("red", "green", "blue")
+    with rasterio.open(raster(tmp_path / "a.tif", levels=(200, 100, 50, 0)).path, "r+") as target:
+        target.descriptions = (*names, text)
+        target.write(np.where(upper_quarter_empty(), 255, 0).astype("uint8"), 4)
+    header = read_raster_header(tmp_path / "a.tif")
+    assert band_names(header, None) == names
+    assert read_image(header.path).valid.mean() == 0.75
+
+
+def test_infrared_of_a_colour_infrared_image_is_known_by_the_colours_of_the_others(tmp_path):
+    header = raster(tmp_path / "a.tif", levels=(200, 100, 50), colours=("undefined", "red", "green"))
+    assert band_names(header, None) == ("nir", "red", "green")
+    assert "band 1: it was taken for near infrared" in assumed_bands(header, None)
+
+
+def test_descriptions_that_contradict_the_colours_of_the_file_are_noted(tmp_path):
+    header = raster(tmp_path / "a.tif", levels=(200, 100, 50), colours=("blue", "green", "red"))
+    with rasterio.open(header.path, "r+") as target:
+        target.descriptions = ("red", "green", "blue")
+    assert "marks them as blue, green, red" in assumed_bands(read_raster_header(header.path), None)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4978"])
+def test_an_image_in_geocentric_coordinates_is_refused_by_its_kind(tmp_path, crs):
+    with pytest.raises(CRSError, match=r"a\.tif: EPSG:4978 is geocentric"):
+        raster(tmp_path / "a.tif", crs=crs)
 
 
 def test_colours_of_other_models_are_refused(tmp_path):
@@ -254,8 +302,20 @@ def test_ground_control_points_alone_are_refused_by_their_name(tmp_path):
 @pytest.mark.parametrize(
     ("unit", "foreign"),
     [
-        *((text, False) for text in ("m (NAVD88)", "[m]", "metres above sea level", "m a.s.l.", "unknown")),
-        *((text, True) for text in ("mm", "US survey foot", "cm", "miles")),
+        *(
+            (text, False)
+            for text in (
+                "m (NAVD88)",
+                "[m]",
+                "metres above sea level",
+                "m a.s.l.",
+                "unknown",
+                "metros",
+                "mètre",
+                "Höhe in m",
+            )
+        ),
+        *((text, True) for text in ("mm", "US survey foot", "cm", "miles", "0.1 m", "m/s", "ft per m")),
     ],
 )
 def test_heights_in_metres_are_known_whatever_follows(tmp_path, unit, foreign):

@@ -14,6 +14,7 @@ from roofbench.core.errors import CRSError, InputError
 from roofbench.scenes.geodata.footprint_stream import open_stream
 from roofbench.scenes.geodata.footprints import Footprints
 from roofbench.scenes.geodata.vector_files import read_footprints, write_footprints
+from roofbench.scenes.geodata.wkb import geometries_of_wkb
 
 SQUARES = shapely.box([500000, 500020, 500040], [0, 0, 0], [500010, 500030, 500050], [10, 10, 10])
 
@@ -372,3 +373,9 @@ def test_a_flatgeobuf_that_ends_inside_its_header_is_refused(tmp_path, size):
     (tmp_path / "b.fgb").write_bytes((tmp_path / "a.fgb").read_bytes()[:size])
     with pytest.raises(InputError, match=f"is truncated: it has {size} bytes and ends inside its header"):
         read_footprints(tmp_path / "b.fgb")
+
+
+def test_a_curve_of_geoparquet_is_refused_by_its_feature(tmp_path):
+    curve = struct.pack("<BII", 1, 10, 0)  # an empty curve polygon
+    with pytest.raises(InputError, match="the outline of feature 1 is a curve: convert it to straight lines"):
+        geometries_of_wkb(np.array([shapely.to_wkb(SQUARES[0]), curve], dtype=object), tmp_path / "a.parquet")
