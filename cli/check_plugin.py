@@ -10,6 +10,7 @@ import typer
 
 from . import completion
 from .command import load_plugins
+from .console import print_result
 from .options import PluginOption
 
 __all__ = ["check_plugin"]
@@ -33,10 +34,10 @@ def check_plugin(
     with redirect_stdout(sys.stderr):
         checks = conformance.check_plugin(chosen)
     for check in checks:
-        typer.echo(
+        print_result(
             f"{'ok    ' if check.passed else 'FAILED'}  {check.rule}{': ' + check.problem if check.problem else ''}"
         )
     failed = sum(not check.passed for check in checks)
-    typer.echo(f"{name}: {len(checks) - failed} of {len(checks)} rules followed")
+    print_result(f"{name}: {len(checks) - failed} of {len(checks)} rules followed")
     if failed:
         raise typer.Exit(3)

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from .console import print_result
 from .evaluation_in_parts import InParts, compare_in_parts, is_large
 from .footprint_inputs import print_problems, read_truth, short_name
 from .options import (
@@ -107,7 +108,7 @@ def compare(
             redraws=redraws,
         )
         result = compare_in_parts(make_evaluator(evaluator, {}), paths, options, title=title)
-        typer.echo(format_pair(result, form, names=names))
+        print_result(format_pair(result, form, names=names))
         return
     one, two = (read_footprints(path, crs=crs) for path in (first, second))
     truth = read_truth(reference, building_id=building_id, crs=crs, evaluation_area=evaluation_area)
@@ -147,4 +148,4 @@ def compare(
         from ..reports.pair_map import pair_figure
 
         save_figure(pair_figure(found, title=title, area=truth.area), plot, overwrite=overwrite)
-    typer.echo(format_pair(found, form, names=names))
+    print_result(format_pair(found, form, names=names))

@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["messages", "print_next", "printable", "say", "table_console"]
+__all__ = ["messages", "print_next", "print_result", "printable", "say", "table_console"]
 
 
 def printable(text: str) -> str:
@@ -24,6 +24,14 @@ def printable(text: str) -> str:
 def say(text: str) -> None:
     """Print a message to standard error."""
     typer.echo(printable(text), err=True)
+
+
+def print_result(text: str | os.PathLike[str], *, nl: bool = True, err: bool = False) -> None:
+    """Print to standard output; to a terminal without control characters, elsewhere as it is."""
+    shown = os.fspath(text)
+    if (sys.stderr if err else sys.stdout).isatty():
+        shown = printable(shown)
+    typer.echo(shown, nl=nl, err=err)
 
 
 def print_next(console: Console, command: str) -> None:

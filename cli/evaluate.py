@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from .console import print_result
 from .evaluation_in_parts import InParts, evaluate_in_parts, is_large
 from .footprint_inputs import print_problems, read_truth, short_name
 from .options import (
@@ -120,7 +121,7 @@ def evaluate(
             redraws=redraws,
         )
         result, doubt = evaluate_in_parts(scorers[0], (detected, reference), options, title=title)
-        typer.echo(format_evaluation(result, form, title=title, uncertainty=doubt))
+        print_result(format_evaluation(result, form, title=title, uncertainty=doubt))
         return
     found = read_footprints(detected, crs=crs)
     given_truth = read_truth(reference, building_id=building_id, crs=crs, evaluation_area=evaluation_area)
@@ -161,7 +162,7 @@ def evaluate(
             from ..reports.verdict_map import verdict_figure
 
             save_figure(verdict_figure(result, title=title, area=boundary), plot, overwrite=overwrite)
-    typer.echo(
+    print_result(
         format_evaluations(results, form, title=title, uncertainties=doubts)
         if every
         else format_evaluation(result, form, title=title, uncertainty=doubts[0])

@@ -12,7 +12,7 @@ import typer
 from ..core.errors import InputError, ParameterError
 from . import completion
 from .command import RunOptions, with_run_options
-from .console import messages, say
+from .console import messages, print_result, say
 from .measuring import measure_suite
 from .options import DetectorOption, FormatOption, IndicesOption, OverwriteOption, ScenesOption, SuiteOption
 
@@ -141,7 +141,7 @@ def gate(
                 chosen, options, indices=indices, margins=margins, level=level, comparisons=comparisons
             )
             _write(output, overwrite, format_self_test(result_of_test, "md"))
-            typer.echo(format_self_test(result_of_test, form))
+            print_result(format_self_test(result_of_test, form))
             raise typer.Exit(result_of_test.exit_code)
         after, _ = measure_suite(chosen, options, messages(options.quiet))
     after = after.with_labels_of(before)
@@ -153,7 +153,7 @@ def gate(
     extra = time_side_by_side(before, after, margin=time_margin, level=level) if time else []
     result = compare(before, after, indices=indices, margins=margins, level=level, extra=extra)
     _write(output, overwrite, format_gate(result, "md"))
-    typer.echo(gate_json(result) if form == "json" else format_gate(result, form))
+    print_result(gate_json(result) if form == "json" else format_gate(result, form))
     raise typer.Exit(result.exit_code)
 
 

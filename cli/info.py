@@ -8,7 +8,7 @@ import typer
 
 from . import completion
 from .command import load_plugins
-from .console import table_console
+from .console import print_result, table_console
 from .options import PluginOption
 
 __all__ = ["info"]
@@ -31,4 +31,4 @@ def info(
 
     load_plugins(plugin)
     width = table_console().width
-    typer.echo("\n\n".join(format_entry(entry, width) for entry in entries_of(name)))
+    print_result("\n\n".join(format_entry(entry, width) for entry in entries_of(name)))

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from .command import load_plugins
-from .console import table_console
+from .console import print_result, table_console
 from .options import FORMAT_HELP, PluginOption
 
 __all__ = ["list_names"]
@@ -28,8 +28,8 @@ def list_names(
     load_plugins(plugin)
     found = entries(kind)
     if form == "table":
-        typer.echo(format_entries(found, table_console().width))
+        print_result(format_entries(found, table_console().width))
         typer.echo("'roofbench info NAME' explains one of them", err=True)
         return
     table = catalogue_table(found)
-    typer.echo({"csv": table.to_csv, "md": table.to_markdown, "json": table.to_json}[form]().rstrip("\n"))
+    print_result({"csv": table.to_csv, "md": table.to_markdown, "json": table.to_json}[form]().rstrip("\n"))

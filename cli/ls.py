@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from .console import print_result
 from .options import DEFAULT_STORE, FORMAT_HELP, DetectorsOption, ScenesOption, StoreOption
 
 __all__ = ["ls"]
@@ -27,4 +28,4 @@ def ls(
 
     listing = list_runs(store, status=status, detector=detectors, scene=scenes, limit=limit or None)
     for piece in format_listing(listing, form):
-        typer.echo(piece, nl=False)
+        print_result(piece, nl=False)

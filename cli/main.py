@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 
 from ..core.errors import RoofbenchError
-from .console import printable, say
+from .console import print_result, printable, say
 from .lazy_group import LazyGroup
 
 __all__ = ["app", "main"]
@@ -41,7 +41,7 @@ def _version(asked: bool) -> None:
     if asked:
         from ..core.package import VERSION
 
-        typer.echo(f"roofbench {VERSION}")
+        print_result(f"roofbench {VERSION}")
         raise typer.Exit
 
 

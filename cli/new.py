@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from .console import say
+from .console import print_result, say
 
 __all__ = ["new"]
 
@@ -35,6 +35,6 @@ def new(
 
     folder = output or Path(name)
     for file in write_template(template, name, folder):
-        typer.echo(file)
+        print_result(file)
     test = "pytest" if find_spec("pytest") else "pip install pytest && pytest"
     say(f"Next: cd {folder} && {test}; README.md lists further commands")

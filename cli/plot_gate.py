@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .console import print_result
 from .options import DpiOption, OverwriteOption, PictureOption
 
 __all__ = ["plot_gate"]
@@ -24,4 +25,4 @@ def plot_gate(
     from ..reports.gate_json import read_gate
 
     save_plot(gate_figure(read_gate(result)), output, dpi=dpi, overwrite=overwrite)
-    typer.echo(output)
+    print_result(output)

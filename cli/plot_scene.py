@@ -10,6 +10,7 @@ import typer
 from ..core.errors import ParameterError, UnknownNameError
 from . import completion
 from .command import load_plugins
+from .console import print_result
 from .options import (
     DEFAULT_STORE,
     DetectorsOption,
@@ -91,7 +92,7 @@ def plot_scene(
     if view is None:
         raise ParameterError(f"{store}: {name!r} has no verdicts to draw: it has no reference, or was not evaluated")
     save_plot(overlay_figure(view, window=_placed(window, view.extent)), output, dpi=dpi, overwrite=overwrite)
-    typer.echo(output)
+    print_result(output)
 
 
 def _placed(window: Window | None, extent: Extent) -> Extent | None:

@@ -9,7 +9,7 @@ import typer
 
 from ..core.errors import ParameterError, UnknownNameError
 from .command import load_plugins
-from .console import say
+from .console import print_result, say
 from .options import (
     DEFAULT_STORE,
     DpiOption,
@@ -70,7 +70,7 @@ def plot_sweep(
     if not lines:
         raise ParameterError(f"{table or store} contains no sweep: 'roofbench sweep DETECTOR --vary ...' makes one")
     save_plot(sensitivity_figure(lines, level=level), output, dpi=dpi, overwrite=overwrite)
-    typer.echo(output)
+    print_result(output)
     for line in lines:
         if line.break_down:
             say(break_down_text(line.break_down))

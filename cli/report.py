@@ -10,7 +10,7 @@ import typer
 from ..core.errors import ParameterError
 from ..core.wording import counted
 from .command import load_plugins
-from .console import messages
+from .console import messages, print_result
 from .options import DetectorsOption, IndexOption, OverwriteOption, PluginOption, QuietOption, ScenesOption
 
 __all__ = ["report"]
@@ -98,7 +98,7 @@ def _compare(
         check_target(output, overwrite)
     with Store(one, must_exist=True) as first, Store(two, must_exist=True) as second:
         result = compare_stores(first, second, detector=detectors, scene=scenes)
-    typer.echo(format_comparison(result, "table"))
+    print_result(format_comparison(result, "table"))
     if output is not None:
         with whole_file(output, overwrite=overwrite) as scratch:
             scratch.write_text(format_comparison(result, form) + "\n", encoding="utf-8")

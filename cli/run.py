@@ -12,7 +12,7 @@ import typer
 from ..core.errors import ParameterError
 from ..core.wording import counted
 from .command import RunOptions, with_run_options
-from .console import messages, print_next, table_console
+from .console import messages, print_next, print_result, table_console
 from .options import (
     DEFAULT_STORE,
     DetectorOption,
@@ -100,7 +100,7 @@ def run(
         for warning in plan.warnings:
             console.print(f"Warning: {warning}", markup=False)
         if dry_run:
-            typer.echo(format_plan(plan, form))
+            print_result(format_plan(plan, form))
             return
         opened.save_plan(suite.name, shlex.join(["roofbench", *sys.argv[1:]]), plan_content(suite))
         with run_progress(plan, console, verbose=options.verbose) as report:

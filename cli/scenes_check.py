@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from .console import say
+from .console import print_result, say
 from .options import FORMAT_HELP
 
 __all__ = ["check"]
@@ -36,9 +36,9 @@ def check(
     reference = open_scene(scene).reference if "reference" in report.facts else None
     warnings = () if reference is None else reference_warnings(reference)
     if form == "json":
-        typer.echo(json.dumps({"facts": report.facts, "problems": report.problems, "warnings": warnings}, indent=2))
+        print_result(json.dumps({"facts": report.facts, "problems": report.problems, "warnings": warnings}, indent=2))
     else:
-        typer.echo(format_facts(report.facts), nl=False)
+        print_result(format_facts(report.facts), nl=False)
     for warning in warnings:
         say(f"Warning: {warning}")
     for problem in report.problems:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from . import completion
+from .console import print_result
 from .options import ParameterOption, QuietOption
 from .progress import import_progress
 
@@ -49,11 +50,11 @@ def fetch(
     if recipe is None:
         for name in open_data_names():
             found = open_data(name)
-            typer.echo(f"{name}: {found.title}\n  licence: {found.licence}\n  tried: {found.tried}")
+            print_result(f"{name}: {found.title}\n  licence: {found.licence}\n  tried: {found.tried}")
             for value, meaning in found.values.items():
-                typer.echo(f"  -p {value}=: {meaning}")
+                print_result(f"  -p {value}=: {meaning}")
             if found.needs_extent:
-                typer.echo(f"  --extent XMIN YMIN XMAX YMAX: metres in {found.crs}")
+                print_result(f"  --extent XMIN YMIN XMAX YMAX: metres in {found.crs}")
         return
     chosen = open_data(recipe)
     if output is None:
@@ -67,7 +68,7 @@ def fetch(
             note=(lambda _: None) if quiet else note,
             progress=move,
         )
-    typer.echo(import_command(chosen, files, extent))
+    print_result(import_command(chosen, files, extent))
 
 
 def import_command(recipe: OpenData, files: Mapping[str, list[Path]], extent: tuple[float, ...] | None) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import messages, print_next
+from .console import messages, print_next, print_result
 from .options import GsdOption, JoinGapsOption, OverwriteOption, QuietOption
 from .progress import import_progress
 from .scenes_index import report_index
@@ -164,7 +164,7 @@ def import_(
         return
     with import_progress() as (note, progress):
         scene = import_scene(output, request, overwrite=overwrite, note=None if quiet else note, progress=progress)
-    typer.echo(f"{output}: scene {scene.name!r} with {', '.join(scene.contents)}")
+    print_result(f"{output}: scene {scene.name!r} with {', '.join(scene.contents)}")
     print_next(messages(quiet), f"roofbench run {shlex.quote(str(output))}")
 
 

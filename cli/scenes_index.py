@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import say
+from .console import print_result, say
 from .options import QuietOption
 from .progress import import_progress
 
@@ -48,6 +48,6 @@ def report_index(folder: Path, found: IndexedFolder) -> None:
         say(f"Error: {problem}")
     for note in found.notes:
         say(f"note: {note}")
-    typer.echo(f"{folder}: scene {found.scene.name!r} with {', '.join(found.scene.contents)}")
+    print_result(f"{folder}: scene {found.scene.name!r} with {', '.join(found.scene.contents)}")
     if found.problems:
         raise typer.Exit(3)

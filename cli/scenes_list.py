@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from .console import print_result
+
 __all__ = ["list_scenes"]
 
 
@@ -17,4 +19,4 @@ def list_scenes(
     """List the synthetic scenes, or the parameters of the generator with unit, range and default."""
     from ..reports.scene_text import format_parameters, format_presets
 
-    typer.echo(format_parameters() if parameters else format_presets())
+    print_result(format_parameters() if parameters else format_presets())

@@ -9,6 +9,7 @@ import typer
 
 from ..core.errors import ParameterError
 from . import completion
+from .console import print_result
 from .options import Assignment, OverwriteOption, ParameterOption, SuiteOption
 
 __all__ = ["make"]
@@ -56,7 +57,7 @@ def _make_scene(preset: str, seed: int, parameters: list[Assignment], output: Pa
     save_scene(scene, output, overwrite=overwrite)
     assert scene.reference is not None
     points = 0 if scene.points is None else len(scene.points)
-    typer.echo(f"{output}: scene {scene.name!r} with {points} points and {len(scene.reference)} reference rectangles")
+    print_result(f"{output}: scene {scene.name!r} with {points} points and {len(scene.reference)} reference rectangles")
 
 
 def _make_suite(suite: str, output: Path, overwrite: bool) -> None:
@@ -64,4 +65,4 @@ def _make_suite(suite: str, output: Path, overwrite: bool) -> None:
     from ..benchmark.suite import suite_of_words
 
     for folder, scene in blind_scenes(suite_of_words([suite]), output, overwrite=overwrite):
-        typer.echo(f"{folder}: {', '.join(scene.contents)}, without reference")
+        print_result(f"{folder}: {', '.join(scene.contents)}, without reference")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .console import print_result
 from .options import DpiOption, OverwriteOption, PictureOption
 
 __all__ = ["show"]
@@ -24,4 +25,4 @@ def show(
     from ..scenes.folder import open_scene
 
     save_figure(scene_figure(open_scene(scene), dpi=dpi), output, overwrite=overwrite)
-    typer.echo(output)
+    print_result(output)

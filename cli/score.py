@@ -14,7 +14,7 @@ import typer
 from ..core.errors import ParameterError
 from ..core.wording import counted
 from .command import load_plugins
-from .console import messages, table_console
+from .console import messages, print_result, table_console
 from .options import (
     DEFAULT_STORE,
     DetectorsOption,
@@ -125,9 +125,9 @@ def _check(suite: Suite, folder: Path) -> None:
 
     problems = dict(contribution_problems(suite, folder))
     for name, problem in problems.items():
-        typer.echo(f"{name}: {problem or 'ok'}")
+        print_result(f"{name}: {problem or 'ok'}")
     wrong = sum(map(bool, problems.values()))
-    typer.echo(f"{counted(len(suite.scenes), 'scene')}, {counted(wrong, 'problem')}")
+    print_result(f"{counted(len(suite.scenes), 'scene')}, {counted(wrong, 'problem')}")
     if wrong:
         raise typer.Exit(2)
 

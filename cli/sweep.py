@@ -11,7 +11,7 @@ from ..core.errors import ParameterError
 from ..core.wording import counted
 from . import completion
 from .command import RunOptions, with_run_options
-from .console import messages, table_console
+from .console import messages, print_result, table_console
 from .options import (
     DetectorSeedsOption,
     EvaluatorsOption,
@@ -130,7 +130,7 @@ def sweep(
     if level is not None:
         first = table[table["evaluator"] == planned.plan.evaluators[0].label]
         for found in break_downs(first, planned.axes, shown, level):
-            typer.echo(break_down_text(found), err=form in ("csv", "json"))
+            print_result(break_down_text(found), err=form in ("csv", "json"))
     unsuccessful = unsuccessful_runs(rows)
     print_unsuccessful(unsuccessful, console)
     if any(run.status == "failed" for run in unsuccessful):
@@ -183,7 +183,7 @@ def _print_published(
         text = shown.to_markdown() + "\n" if form == "md" else shown.to_text(console.width)
         console.print(text, markup=False, soft_wrap=True)
     held = sum(found.reproduced for found in findings)
-    typer.echo(f"{target}: {held} of {len(findings)} statements of the text reproduced", err=form in ("csv", "json"))
+    print_result(f"{target}: {held} of {len(findings)} statements of the text reproduced", err=form in ("csv", "json"))
 
 
 def _print(table: pd.DataFrame, planned: Sweep, index: Index, form: Literal["table", "csv", "md", "json"]) -> None:
@@ -191,7 +191,7 @@ def _print(table: pd.DataFrame, planned: Sweep, index: Index, form: Literal["tab
 
     if form in ("csv", "json"):
         tidy = sweep_records(table)
-        typer.echo(tidy.to_csv() if form == "csv" else tidy.to_json(), nl=form == "json")
+        print_result(tidy.to_csv() if form == "csv" else tidy.to_json(), nl=form == "json")
         return
     first = planned.plan.evaluators[0].label
     console = table_console()

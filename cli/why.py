@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import typer
-
 from .command import load_plugins
+from .console import print_result
 from .options import DEFAULT_STORE, PluginOption, RunArgument, StoreOption
 
 __all__ = ["why"]
@@ -17,4 +16,4 @@ def why(run: RunArgument, store: StoreOption = DEFAULT_STORE, plugin: PluginOpti
 
     load_plugins(plugin)
     with Store(store, must_exist=True) as opened:
-        typer.echo(format_run(opened, opened.run(run)))
+        print_result(format_run(opened, opened.run(run)))

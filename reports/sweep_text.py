@@ -12,7 +12,7 @@ from ..core.output import check_target, whole_file
 from ..core.parameters import parameter_text
 from ..evaluators.base import Index
 from .format import column_title, index_name, interval_text, number_text, value_text
-from .tables import Column, Table
+from .tables import Column, Table, inert_cell
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +31,9 @@ def write_sweep_table(table: pd.DataFrame, path: Path, *, overwrite: bool) -> No
     """Write a tidy table as CSV or Parquet, whole or not at all."""
     with whole_file(path, overwrite=overwrite) as scratch:
         if path.suffix.lower() == ".csv":
-            table.to_csv(scratch, index=False)
+            texts = table.select_dtypes(include=["object", "string"]).columns
+            cells = {name: [inert_cell(v) if isinstance(v, str) else v for v in table[name]] for name in texts}
+            table.assign(**cells).to_csv(scratch, index=False)
             return
         try:
             table.to_parquet(scratch, index=False)

@@ -18,12 +18,23 @@ from .format import cell_width, one_line, shortened
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Column", "Table", "escaped_markdown"]
+__all__ = ["Column", "Table", "escaped_markdown", "inert_cell"]
 
 Value: TypeAlias = str | int | float | None
 
+#: First characters of texts that spreadsheets take for formulas.
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 #: Characters between the columns of a text table, and the least width to which a long column is cut.
 _GAP, _LEAST = 2, 16
+
+
+def inert_cell(text: str) -> str:
+    """Return text for CSV; an apostrophe precedes what a spreadsheet would take for a formula.
+
+    >>> inert_cell("=1+1"), inert_cell("a=b")
+    ("'=1+1", 'a=b')
+    """
+    return f"'{text}" if text.startswith(_FORMULA) else text
 
 
 @dataclass(frozen=True)
@@ -153,7 +164,7 @@ class Table:
     def to_csv(self, *, header: bool = True) -> str:
         """Return CSV, with a header unless it continues another table; numbers as Python writes them.
 
-        Undefined values are empty.
+        Undefined values are empty. Texts that a spreadsheet would compute begin with an apostrophe (`inert_cell`).
         """
         text = io.StringIO()
         # With this line end the writer quotes texts that hold "\r", too; lines end in "\n" all the same.
@@ -163,7 +174,7 @@ class Table:
         for row in rows:
             text.seek(0)
             text.truncate()
-            writer.writerow(row)
+            writer.writerow([inert_cell(value) if isinstance(value, str) else value for value in row])
             lines.append(text.getvalue().removesuffix("\r\n") + "\n")
         return "".join(lines)
 

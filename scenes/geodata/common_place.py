@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from .crs import scale_warning
+from .crs import same_crs, scale_warning
 from .footprints import Footprints
 
 __all__ = ["Extent", "extent_warnings", "place_warnings", "reaches"]
@@ -33,7 +33,9 @@ def extent_warnings(detected: Extent, reference: Extent) -> list[str]:
         return []
     warnings = []
     low, high = np.max([box[:2] for box in boxes], axis=0), np.min([box[2:] for box in boxes], axis=0)
-    if (low > high).any():
+    # Two systems are an error of their own, and their numbers cannot be compared.
+    comparable = None in (detected.crs, reference.crs) or same_crs(str(detected.crs), str(reference.crs))
+    if comparable and (low > high).any():
         ranges = [f"x {box[0]:.0f} to {box[2]:.0f}, y {box[1]:.0f} to {box[3]:.0f}" for box in boxes]
         warnings.append(
             f"warning: {detected.source} lies in {ranges[0]} and {reference.source} in {ranges[1]}: no overlap at all, "

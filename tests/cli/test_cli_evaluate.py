@@ -186,6 +186,14 @@ def test_sets_that_cannot_be_of_one_place_are_warned_of(files):
     assert roofbench("evaluate", "d.geojson", "r.gpkg", folder=files).stderr == ""
 
 
+def test_files_of_two_systems_are_refused_without_a_word_on_their_place(files):
+    far = shapely.transform(np.array(HOUSES), lambda points: points + np.array([-4e5, 0]))
+    rb.write_footprints(rb.Footprints.of(far, crs="EPSG:25833"), files / "zone33.gpkg")
+    message = roofbench("evaluate", "zone33.gpkg", "r.gpkg", folder=files).stderr
+    assert "zone33.gpkg is in EPSG:25833 but r.gpkg in EPSG:25832" in message
+    assert "no overlap" not in message
+
+
 def test_areas_that_a_projection_stretches_are_warned_of(files):
     north = shapely.transform(np.array(HOUSES), lambda points: points + np.array([1e6, 6.38e6]))
     rb.write_footprints(rb.Footprints.of(north, crs="EPSG:3857"), files / "web.gpkg")

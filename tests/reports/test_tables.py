@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from roofbench.reports.format import cell_width, interval_text, number_text, shortened
-from roofbench.reports.tables import Column, Table
+from roofbench.reports.tables import Column, Table, inert_cell
 
 VALUES = st.one_of(st.none(), st.integers(), st.floats(allow_nan=False), st.text(max_size=30))
 TABLES = st.integers(1, 5).flatmap(
@@ -36,8 +36,9 @@ def test_a_text_line_for_the_head_the_rule_and_every_row(table):
 @example(table=Table.of([Column("a"), Column("b")], [[None, "\r"], ["\r\n", "x\ry"]]))
 def test_csv_is_read_back_with_what_was_in_the_cells(table):
     head, *rows = csv.reader(io.StringIO(table.to_csv(), newline=""))
-    assert head == [column.title for column in table.columns]
-    expected = [["" if value is None else str(value) for value in row] for row in table.rows]
+    assert head == [inert_cell(column.title) for column in table.columns]
+    texts = [[inert_cell(value) if isinstance(value, str) else value for value in row] for row in table.rows]
+    expected = [["" if value is None else str(value) for value in row] for row in texts]
     if len(table.columns) > 1:  # csv cannot tell a row of one empty cell from an empty line
         assert [[cell.replace("\r\n", "\n") for cell in row] for row in rows] == [
             [cell.replace("\r\n", "\n") for cell in row] for row in expected
@@ -94,3 +95,9 @@ def test_signed_numbers_always_have_a_sign():
 def test_shortened_text_is_not_longer_than_asked(text, width):
     assert len(shortened(text, width)) <= width
     assert "\n" not in shortened(text, width)
+
+
+def test_texts_that_a_spreadsheet_would_compute_are_texts_in_csv():
+    rows = [["=cmd|' /c calc'!A0", -1.5], ["@SUM(A1)", None], ["-x", 2], ["a=b", 3]]
+    _, *lines = csv.reader(io.StringIO(Table.of([Column("=a"), Column("b")], rows).to_csv(), newline=""))
+    assert lines == [["'=cmd|' /c calc'!A0", "-1.5"], ["'@SUM(A1)", ""], ["'-x", "2"], ["a=b", "3"]]
