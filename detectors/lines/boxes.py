@@ -44,6 +44,7 @@ __all__ = [
     "rescaled",
     "row_range",
     "sum_in_box",
+    "sums_in_box",
     "to_box",
     "widths",
 ]
@@ -154,6 +155,26 @@ def sum_in_box(prefix: NDArray[np.int32], box: NDArray[np.float64]) -> tuple[int
                 on_raster += last - first
                 total += prefix[row, last] - prefix[row, first]
     return total, on_raster, in_all
+
+
+@kernel
+def sums_in_box(
+    prefix: NDArray[np.int32], other: NDArray[np.int32], box: NDArray[np.float64]
+) -> tuple[int, int, int, int]:
+    """Return what `sum_in_box` does for two rasters of one shape: both sums, then the numbers of cells."""
+    rows, columns = prefix.shape[0], prefix.shape[1] - 1
+    first_row, last_row = row_range(box)
+    total, of_other, on_raster, in_all = 0, 0, 0, 0
+    for row in range(first_row, last_row):
+        first, last = column_range(box, row)
+        in_all += last - first
+        if 0 <= row < rows:
+            first, last = max(first, 0), min(last, columns)
+            if last > first:
+                on_raster += last - first
+                total += prefix[row, last] - prefix[row, first]
+                of_other += other[row, last] - other[row, first]
+    return total, of_other, on_raster, in_all
 
 
 @kernel

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from .boxes import U0, U1, V0, V1, Boxes, sum_in_box
+from .boxes import U0, U1, V0, V1, Boxes, sum_in_box, sums_in_box
 
 __all__ = ["Cover", "Growth", "band", "extend_lines", "extend_rectangle", "last_step", "mean_in_boxes"]
 
@@ -91,21 +91,18 @@ def mean_in_boxes(prefix: NDArray[np.int32], boxes: NDArray[np.float64]) -> NDAr
 
 
 @kernel
-def is_vegetation(cover: Cover, rules: Growth, box: NDArray[np.float64], green: bool) -> bool:
-    """Return whether the cells in a box look like vegetation; with `same_kind`, unlike the line, green or not."""
-    is_green = mean_in_box(cover.vegetation, box) > rules.vegetation
-    if rules.same_kind and is_green != green:
-        return True
-    if not is_green:
-        return False
-    return len(cover.entropy) == 0 or mean_in_box(cover.entropy, box) > rules.entropy
-
-
-@kernel
 def passes(cover: Cover, rules: Growth, strip: NDArray[np.float64], green: bool) -> bool:
-    """Return whether a part of a strip may be added."""
-    black, _, cells = sum_in_box(cover.black, strip)
-    return cells > 0 and black > rules.black_share * cells and not is_vegetation(cover, rules, strip, green)
+    """Return whether a part of a strip may be added: black, and no vegetation.
+
+    With `same_kind`, a part that is unlike the line, green or not, may not either.
+    """
+    black, index, on_raster, cells = sums_in_box(cover.black, cover.vegetation, strip)
+    if cells == 0 or black <= rules.black_share * cells:
+        return False
+    is_green = (index / on_raster if on_raster > 0 else 0.0) > rules.vegetation
+    if rules.same_kind and is_green != green:
+        return False
+    return not is_green or (len(cover.entropy) > 0 and mean_in_box(cover.entropy, strip) <= rules.entropy)
 
 
 @kernel

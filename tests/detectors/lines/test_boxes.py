@@ -7,7 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from naive import lines as naive_lines
 
-from roofbench.detectors.lines.boxes import box_centres, box_corners, lengths, prefix_sums, sum_in_box, widths
+from roofbench.detectors.lines.boxes import (
+    box_centres,
+    box_corners,
+    lengths,
+    prefix_sums,
+    sum_in_box,
+    sums_in_box,
+    widths,
+)
 
 angles = st.floats(0, 2 * np.pi)
 places = st.floats(-20, 60)
@@ -24,9 +32,12 @@ def test_the_sum_in_a_box_is_the_sum_over_its_cells(x, y, angle, length, width):
     raster = np.random.default_rng(0).integers(0, 256, (40, 47), dtype=np.uint8)
     box = make_box(x, y, angle, length, width)
     inside = naive_lines.cells_in_box(box, *raster.shape)
-    total, on_raster, _ = sum_in_box(prefix_sums(raster), box)
+    total, on_raster, in_all = sum_in_box(prefix_sums(raster), box)
     assert total == raster[inside].astype(int).sum()
     assert on_raster == inside.sum()
+    other = 255 - raster[::-1]
+    of_other = other[inside].astype(int).sum()
+    assert sums_in_box(prefix_sums(raster), prefix_sums(other), box) == (total, of_other, on_raster, in_all)
 
 
 def test_cells_beyond_the_raster_are_counted_apart():
