@@ -29,7 +29,7 @@ __all__ = ["add_image", "image_silence", "rate_image", "tally_image"]
 _Ratings = NDArray[np.float32]
 
 #: Greenness from the threshold to a rating of 1, and nats of a rating of 1.
-_WIDTH, _WEIGHT = 0.05, 1.0
+_WIDTH, _WEIGHT = 0.05, 0.5
 #: Ratings are added up in thousandths.
 _PARTS = 1000
 

@@ -44,6 +44,8 @@ _LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 3.5, 12.0
 _REACH, _SHOULDER = 2, 2
 #: Stations that the mean of colours reaches on either side: they are blurred by a pixel, and pixels are displaced.
 _COLOUR_REACH = 3
+#: Metres: deepest houses whose colours differ; on deeper roofs patches of membrane and gravel do.
+_DEEPEST = 16.0
 #: Share of the least colour edge that is noise, share of the lines that must have colours, and metres of a step that a
 #: difference of 1 counts like.
 _COLOUR_NOISE, _KNOWN_COLOUR, _COLOUR_METRES = 0.5, 0.5, 20.0
@@ -136,7 +138,7 @@ def party_walls(
     row = np.clip(_cell_of(y), 0, grid.rows - 1)
     high = state[row, column] == HIGH
     strength = wall_strength(np.where(high, height[row, column] / 100.0, np.nan), rule)
-    if colours is not None:
+    if colours is not None and depth <= _DEEPEST:
         strength += colour_strength(np.where(high, colours_at(colours, row, column), np.nan), rule)
     found: list[float] = []
     for station in np.argsort(-strength, kind="stable"):

@@ -29,7 +29,7 @@ def test_green_crowns_get_less_and_red_roofs_more():
     tally = tally_image(ratings, STATE, SCORE)
     assert tally.tolist() == [200, 200_000, 200, -200_000]
     assert image_silence(tally) is None
-    np.testing.assert_array_equal(add_image(SCORE, STATE, ratings, 0.5), np.where(SCORE > 0, 2500, -2000))
+    np.testing.assert_array_equal(add_image(SCORE, STATE, ratings, 2.0), np.where(SCORE > 0, 3000, -2500))
 
 
 def test_colours_that_say_the_same_of_both_are_silent():

@@ -265,6 +265,17 @@ def test_tiles_of_another_colour_are_another_house_and_shade_is_not(other, build
     assert len(found.buildings) == buildings
 
 
+def test_patches_of_another_colour_on_a_deep_roof_are_no_houses():
+    hall = (10, 10, 58, 30)
+    height, state = place((hall, flat))
+    x = (np.arange(GRID.columns) + 0.5) * GRID.gsd
+    lines = np.where((((x - 10) // 6) % 2 == 0)[:, None], (150, 100, 80), (90, 100, 120)).T.astype(np.uint8)
+    image = Image(np.repeat(lines[:, None], GRID.rows, axis=1), ("red", "green", "blue"), GRID)
+    sides = np.array([rectangle(*hall)])
+    blocks = shapely.polygons(to_world(sides, GRID))
+    assert len(find_levels(sides, blocks, height, state, GRID, lambda: image).buildings) == 1
+
+
 def test_wings_with_a_step_each_are_one_building():
     wings = [(10, top, 26, top + 8) for top in (10, 18, 26)]
     roof = steps(8.0, 10.0, 0.6)
