@@ -198,8 +198,12 @@ class Table:
         import html
 
         def line(tag: str, texts: Iterable[str]) -> str:
+            wraps = "; white-space: nowrap" if tag == "td" else ""  # a number is not separated from its unit
             cells = zip(texts, self.columns, strict=True)
-            return "".join(f'<{tag} style="text-align: {c.align}">{html.escape(text)}</{tag}>' for text, c in cells)
+            return "".join(
+                f'<{tag} style="text-align: {c.align}{wraps if c.align == "right" else ""}">{html.escape(text)}</{tag}>'
+                for text, c in cells
+            )
 
         head = line("th", (column.title for column in self.columns))
         rows = zip(*self._cells(), strict=True)
