@@ -19,9 +19,10 @@ function shape(name, attributes = {}) {
 }
 
 // A reason travels as the number of its phrase and the numbers that belong between its parts.
-function reason(text) {
-  const [phrase, ...numbers] = text.split(" ");
-  return data.phrases[phrase].reduce((said, part, place) => said + numbers[place - 1] + part);
+function reason(coded) {
+  const [phrase, ...numbers] = coded.split(" ");
+  const text = data.phrases[phrase].reduce((said, part, place) => said + numbers[place - 1] + part);
+  return text.replaceAll(" %", "\u00a0%"); // a number is not separated from its unit
 }
 
 // ---- theme ---------------------------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from typing import Any
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
+LIGHT = [{"name": "prefers-color-scheme", "value": "light"}]
 sys.path.insert(0, str(ROOT / "tests"))
 
 
@@ -37,6 +38,29 @@ def shoot(driver: Any, page: str, file: Path, *, width: int, height: int, media:
     driver.get(page)
     driver.implicitly_wait(1)
     save(base64.b64decode(driver.get_screenshot_as_base64()), file)
+
+
+def shoot_object(driver: Any, page: str, file: Path, *, scene: str, detector: str) -> None:
+    """Photograph the map of a report with a reference chosen that was merged with another one."""
+    from selenium.webdriver.support.ui import Select
+
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": LIGHT})
+    size = {"width": 1400, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    driver.get(page)
+    Select(driver.find_element("id", "scene")).select_by_visible_text(scene)
+    for box in driver.find_elements("css selector", "#detectors label"):
+        switch = box.find_element("css selector", "input")
+        if switch.is_selected() != box.text.startswith(detector):
+            switch.click()
+    detail = driver.find_element("id", "detail")
+    for _ in range(50):
+        driver.find_element("id", "next-error").click()
+        if "merged" in detail.text:
+            break
+    driver.find_element("id", "zoom-fit").click()
+    driver.execute_script("document.getElementById('viewer').scrollIntoView()")
+    save(driver.find_element("id", "viewer").screenshot_as_png, file)
 
 
 def terminal(text: str) -> str:
@@ -60,6 +84,7 @@ def main(report: str, site: str, folder: str) -> None:
         shoot(driver, report_page, target / "report-phone.png", width=390, height=844, media=dark)
         notebook = (Path(site).resolve() / "notebooks" / "evaluate-footprints.html").as_uri()
         shoot(driver, notebook, target / "notebook.png", width=1300, height=1000, media=light)
+        shoot_object(driver, report_page, target / "report-object.png", scene="knox-small-1", detector="mpp")
         printed = terminal(sys.stdin.read())
         page = Path(profile) / "terminal.html"
         page.write_text(printed, encoding="utf-8")
