@@ -189,7 +189,7 @@ def test_sets_that_cannot_be_of_one_place_are_warned_of(files):
 def test_files_of_two_systems_are_refused_without_a_word_on_their_place(files):
     far = shapely.transform(np.array(HOUSES), lambda points: points + np.array([-4e5, 0]))
     rb.write_footprints(rb.Footprints.of(far, crs="EPSG:25833"), files / "zone33.gpkg")
-    message = roofbench("evaluate", "zone33.gpkg", "r.gpkg", folder=files).stderr
+    message = roofbench("evaluate", "zone33.gpkg", "r.gpkg", folder=files, expect=2).stderr
     assert "zone33.gpkg is in EPSG:25833 but r.gpkg in EPSG:25832" in message
     assert "no overlap" not in message
 
