@@ -76,13 +76,17 @@ def kill_stage(stage: str, folder: Path, kills: int, *, stream: int = 0) -> Resu
         process = _start(stage, folder, _AGAIN)
         try:
             process.wait(timeout=draw.uniform(0.2, 0.95) * duration)
+            early = True
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
-            done += 1
+            early, done = False, done + 1
         process.communicate()
         if stage in ("run", "sweep"):
+            # What is stored is not run again: after a call that was faster than its kill, all work is to be done anew.
             found = _written(folder, _AGAIN) if (folder / f"{_AGAIN}.sqlite").exists() else []
             partial += any(row not in whole for row in found)
+            if early:
+                _remove(folder, _AGAIN)
         else:
             found = _written(folder, _AGAIN)
             partial += bool(found) and found != whole
