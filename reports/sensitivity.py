@@ -26,6 +26,8 @@ from .inline_svg import INK, SERIES, new_figure, style_axes
 __all__ = ["sensitivity_figure"]
 
 _DASHES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
+#: Widths in a legend, inches: the sample of a line with its gaps, and a letter.
+_LEGEND_MARK, _LEGEND_LETTER = 0.6, 0.075
 _COLUMNS = 3
 
 
@@ -183,10 +185,12 @@ def _legend(figure: Figure, detectors: Sequence[str], indices: Sequence[str], ma
         Line2D([], [], color=INK, linestyle=_DASHES[place % len(_DASHES)], linewidth=1.5, label=name)
         for place, name in enumerate(indices)
     ]
+    entries = [*handles, *marks]
+    widest = _LEGEND_MARK + _LEGEND_LETTER * max(len(str(entry.get_label())) for entry in entries)
     figure.legend(
-        handles=[*handles, *marks],
+        handles=entries,
         loc="outside lower center",
-        ncols=min(4, len(handles) + len(marks)),
+        ncols=max(1, min(4, len(entries), int(figure.get_figwidth() / widest))),
         frameon=False,
         fontsize=9,
         labelcolor=INK,
