@@ -32,6 +32,7 @@ __all__ = ["scene_figure"]
 #: Most cells along a side of a panel; more would not be seen.
 _MOST_CELLS = 1500
 _REFERENCE, _AREA = "#d7301f", "#08519c"
+_WIDTH = 4.6  # of a panel, inches
 
 
 def scene_figure(scene: Scene, *, dpi: int = 130) -> Figure:
@@ -48,9 +49,8 @@ def scene_figure(scene: Scene, *, dpi: int = 130) -> Figure:
         panels.append(lambda axes: _draw_reference(axes, scene, surface))
 
     xmin, ymin, xmax, ymax = scene.extent
-    shape = float(np.clip((ymax - ymin) / (xmax - xmin), 0.3, 2.5))
-    width = 4.6
-    figure = Figure(figsize=(width * len(panels) + 0.2, width * shape + 1.0), dpi=dpi, layout="constrained")
+    size = _WIDTH * len(panels) + 0.2, _panel_height(scene) + 1.0
+    figure = Figure(figsize=size, dpi=dpi, layout="constrained")
     figure.suptitle(_title(scene), fontsize=11)
     for number, draw in enumerate(panels, start=1):
         axes = figure.add_subplot(1, len(panels), number)
@@ -62,6 +62,12 @@ def scene_figure(scene: Scene, *, dpi: int = 130) -> Figure:
         axes.set_yticks([])
         add_scale_bar(axes)
     return figure
+
+
+def _panel_height(scene: Scene) -> float:
+    """Return the height of a panel, inches."""
+    xmin, ymin, xmax, ymax = scene.extent
+    return _WIDTH * float(np.clip((ymax - ymin) / (xmax - xmin), 0.3, 2.5))
 
 
 def _title(scene: Scene) -> str:
@@ -123,8 +129,9 @@ def _draw_height(axes: Axes, scene: Scene, surface: Elevation) -> None:
     axes.imshow(colours, extent=_bounds(surface.grid), interpolation="antialiased")
     axes.set_title(f"{label}, shaded, {surface.grid.gsd:g} m", fontsize=9)
     assert axes.figure is not None
-    # Inset, so that the panels stay of one size.
-    strip = axes.inset_axes((0.0, -0.06, 1.0, 0.03))
+    # Inset, so that the panels stay of one size, and of one height and distance in inches on each scene.
+    inch = 1.0 / _panel_height(scene)
+    strip = axes.inset_axes((0.0, -0.27 * inch, 1.0, 0.13 * inch))
     bar = axes.figure.colorbar(ScalarMappable(scale, "viridis"), cax=strip, orientation="horizontal")
     bar.ax.xaxis.set_major_formatter("{x:g} m")
     bar.ax.tick_params(labelsize=8)
