@@ -2,7 +2,8 @@
 
 Run by hand: ``python tests/performance/study_leaderboard_page.py board/roofbench.sqlite REVISION > leaderboard.md``.
 Stored detections are evaluated here, so that no detector runs. Runs of other code than the installed one are left out;
-REVISION is that of the installed code.
+REVISION is that of the installed code. ``--programs STORE REVISION`` takes the runs of programs of others (`command`)
+from another store, made by roofbench as it was at a revision: they take hours and do not depend on the detectors here.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import argparse
 import datetime
 import statistics
 from collections import defaultdict
+from contextlib import ExitStack
 from pathlib import Path
 
 import roofbench as rb
@@ -36,11 +38,12 @@ MATCHINGS = {
     "one-pass": "one pass in file order, as the papers' text can be read",
     "overlap": "the largest overlap decides",
 }
+PROGRAMS = ("command:whitebox", "command:cloth-filter", "command:grass")
 DETECTORS = (
     *("original", "original[mode=paper]", "original[mode=program]"),
     *("improved", "improved[mode=paper]", "improved[mode=program]"),
     *("mpp", "mpp[level=part]", "mpp-printed", "dempster-shafer", "ndsm"),
-    *("command:whitebox", "command:cloth-filter", "command:grass"),
+    *PROGRAMS,
 )
 QUALITY = ("object.quality", "pixel.quality")
 
@@ -49,8 +52,16 @@ def newest(store):
     """Return the last run of every label, scene and seed, of those by the code that is installed."""
     rows = sorted((row for row in store.runs() if row.label in DETECTORS), key=lambda row: row.id)
     digests = {name: source_closure(DETECTORS_BY_NAME.get(name)).digest for name in {row.detector for row in rows}}
-    current = [row for row in rows if store.code(row.id).digest == digests[row.detector]]
-    return list({(row.label, row.scene, row.seed): row for row in current}.values())
+    return last_of(row for row in rows if store.code(row.id).digest == digests[row.detector])
+
+
+def newest_of_programs(store):
+    """Return the last run of every program of others on every scene."""
+    return last_of(sorted((row for row in store.runs() if row.label in PROGRAMS), key=lambda row: row.id))
+
+
+def last_of(rows):
+    return list({(row.label, row.scene, row.seed): row for row in rows}.values())
 
 
 def column_of(row):
@@ -120,14 +131,16 @@ def without_result(rows):
     return states, lines
 
 
-def page(file, revision):
-    """Return the page."""
-    with Store(file) as store:
-        rows = newest(store)
-        states, sentences = without_result(rows)
-        by_matching = {matching: qualities(store, rows, matching) for matching in MATCHINGS}
-    day = max(datetime.date.fromisoformat(row.finished[:10]) for row in rows)
+def page(parts):
+    """Return the page of (store, rows, revision)."""
+    rows = [row for _, some, _ in parts for row in some]
+    states, sentences = without_result(rows)
+    by_matching = {matching: defaultdict(lambda: defaultdict(list)) for matching in MATCHINGS}
+    for matching, found in by_matching.items():
+        for store, some, _ in parts:
+            found.update(qualities(store, some, matching))
     good = sum(row.status == "ok" for row in rows)
+    made = "; ".join(f"{names_of(some)} at revision {revision}, {days_of(some)}" for _, some, revision in parts if some)
     lines = [
         "# One leaderboard",
         "",
@@ -135,7 +148,7 @@ def page(file, revision):
         "object quality / pixel quality, percent, means over the scenes of a column. Printed figures are of other",
         "data, the real places that the presets follow, so they allow a comparison and no more.",
         "",
-        f"Measured {day} at revision {revision}, {len(rows)} runs, {good} with a result. The command",
+        f"{len(rows)} runs, {good} with a result: {made}. The command",
         "`python tests/performance/study_leaderboard.py FOLDER -o board` runs it; the folder holds the real scenes.",
         "`tests/performance/study_leaderboard_page.py` writes this page.",
     ]
@@ -149,12 +162,33 @@ def page(file, revision):
     return "\n".join(lines) + "\n"
 
 
+def names_of(rows):
+    """Return what rows are of, in words."""
+    return "programs of others" if all(row.label in PROGRAMS for row in rows) else "detectors of roofbench"
+
+
+def days_of(rows):
+    """Return the days of the runs."""
+    days = sorted({datetime.date.fromisoformat(row.finished[:10]).isoformat() for row in rows})
+    return days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("store", type=Path)
     parser.add_argument("revision")
+    parser.add_argument("--programs", nargs=2, metavar=("STORE", "REVISION"))
     options = parser.parse_args()
-    print(page(options.store, options.revision), end="")
+    with ExitStack() as stack:
+        store = stack.enter_context(Store(options.store))
+        rows = newest(store)
+        parts = [(store, rows, options.revision)]
+        if options.programs:
+            file, revision = options.programs
+            others = stack.enter_context(Store(Path(file)))
+            own = [row for row in rows if row.label not in PROGRAMS]
+            parts = [(store, own, options.revision), (others, newest_of_programs(others), revision)]
+        print(page(parts), end="")
 
 
 if __name__ == "__main__":
