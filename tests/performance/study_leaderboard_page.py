@@ -148,9 +148,9 @@ def page(parts):
         "object quality / pixel quality, percent, means over the scenes of a column. Printed figures are of other",
         "data, the real places that the presets follow, so they allow a comparison and no more.",
         "",
-        f"{len(rows)} runs, {good} with a result: {made}. The command",
-        "`python tests/performance/study_leaderboard.py FOLDER -o board` runs it; the folder holds the real scenes.",
-        "`tests/performance/study_leaderboard_page.py` writes this page.",
+        f"{len(rows)} runs, {good} with a result: {made}.",
+        "`python tests/performance/study_leaderboard.py FOLDER -o board` runs them; the folder holds the real scenes.",
+        "`tests/performance/study_leaderboard_page.py` writes this page. An empty cell was not run.",
     ]
     for matching, meaning in MATCHINGS.items():
         found = by_matching[matching]
