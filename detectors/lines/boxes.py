@@ -141,27 +141,10 @@ def column_range(box: NDArray[np.float64], row: int) -> tuple[int, int]:
 
 
 @kernel
-def sum_in_box(prefix: NDArray[np.int32], box: NDArray[np.float64]) -> tuple[int, int, int]:
-    """Return the sum over the cells whose centre is in the box, their number on the raster, and their total number."""
-    rows, columns = prefix.shape[0], prefix.shape[1] - 1
-    first_row, last_row = row_range(box)
-    total, on_raster, in_all = 0, 0, 0
-    for row in range(first_row, last_row):
-        first, last = column_range(box, row)
-        in_all += last - first
-        if 0 <= row < rows:
-            first, last = max(first, 0), min(last, columns)
-            if last > first:
-                on_raster += last - first
-                total += prefix[row, last] - prefix[row, first]
-    return total, on_raster, in_all
-
-
-@kernel
 def sums_in_box(
     prefix: NDArray[np.int32], other: NDArray[np.int32], box: NDArray[np.float64]
 ) -> tuple[int, int, int, int]:
-    """Return what `sum_in_box` does for two rasters of one shape: both sums, then the numbers of cells."""
+    """Return the sums of two rasters over the cells whose centre is in the box, their number on them, and in all."""
     rows, columns = prefix.shape[0], prefix.shape[1] - 1
     first_row, last_row = row_range(box)
     total, of_other, on_raster, in_all = 0, 0, 0, 0
@@ -175,6 +158,13 @@ def sums_in_box(
                 total += prefix[row, last] - prefix[row, first]
                 of_other += other[row, last] - other[row, first]
     return total, of_other, on_raster, in_all
+
+
+@kernel
+def sum_in_box(prefix: NDArray[np.int32], box: NDArray[np.float64]) -> tuple[int, int, int]:
+    """Return the sum over the cells whose centre is in the box, their number on the raster, and their total number."""
+    total, _, on_raster, in_all = sums_in_box(prefix, prefix, box)
+    return total, on_raster, in_all
 
 
 @kernel
