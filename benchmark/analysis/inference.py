@@ -57,7 +57,7 @@ def bootstrap_interval(values: ArrayLike, *, level: float = LEVEL) -> tuple[floa
     >>> bootstrap_interval([0.5]) is None
     True
     """
-    numbers = np.asarray(values, dtype=np.float64)
+    numbers = np.sort(np.asarray(values, dtype=np.float64))  # the order in which scenes come is no information
     if len(numbers) < 2:
         return None
     if (numbers == numbers[0]).all():

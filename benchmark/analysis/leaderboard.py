@@ -204,7 +204,7 @@ class _Tally:
             return {}
         weights = resampling_weights(len(scenes), _RESAMPLES)
         resampled: dict[str, list[float]] = {}
-        for tallies in self._evaluator.tallies_type.resampled(list(scenes.values()), weights):
+        for tallies in self._evaluator.tallies_type.resampled([scenes[name] for name in sorted(scenes)], weights):
             for index in self._evaluator.indices:
                 value = index.formula(tallies)
                 if value is not None:

@@ -167,6 +167,20 @@ def test_intervals_hold_the_value_and_need_two_scenes():
     assert (alone.low, alone.high) == (None, None)
 
 
+def test_intervals_do_not_depend_on_the_order_of_the_scenes():
+    """A run lists scenes as its suite does, a report as they were stored."""
+    found = dict(zip(range(1, 11), (3, 9, 5, 7, 1, 8, 2, 6, 10, 4), strict=True))
+    boards = []
+    for order in (range(1, 11), (3, 1, 4, 2, 10, 8, 9, 5, 7, 6)):
+        runs = Runs()
+        for scene in order:
+            runs.add("d", scene, found[scene])
+        boards.append(runs.board())
+    for pooling in ("pooled", "mean"):
+        one, other = (cell(board, "d", "object.completeness", pooling) for board in boards)
+        assert (one.low, one.high) == (other.low, other.high)
+
+
 def test_detectors_without_a_significant_difference_share_a_letter():
     runs = Runs()
     for scene, found in zip(range(1, 11), itertools.cycle((7, 8)), strict=False):
