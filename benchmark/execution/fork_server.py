@@ -165,7 +165,7 @@ def _run(main: Callable[[], None], folder: str, inward: int, outward: int) -> No
     try:
         os.dup2(inward, 0)
         os.dup2(outward, 1)
-        os.closerange(3, os.sysconf("SC_OPEN_MAX"))
+        _close_inherited()
         os.chdir(folder)
         np.random.seed()  # noqa: NPY002 - a fork has the state of its parent; that of `random` is renewed by Python
         main()
@@ -177,6 +177,14 @@ def _run(main: Callable[[], None], folder: str, inward: int, outward: int) -> No
         with suppress(Exception):
             sys.stderr.flush()
         os._exit(code if isinstance(code, int) else 1)
+
+
+def _close_inherited() -> None:
+    """Close all but the standard streams. Up to a thousand million may be allowed, so only the open ones are closed."""
+    for name in os.listdir("/proc/self/fd"):
+        with suppress(OSError):
+            if int(name) > 2:
+                os.close(int(name))
 
 
 def _wait(control: socket.socket, pid: int) -> dict[str, Any]:
