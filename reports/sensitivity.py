@@ -152,7 +152,7 @@ def _label_axis(
     left_out = dict.fromkeys(parameter_text(value) for line in lines for value in line.left_out)
     more = f"\nleft out (other scenes): {shortened(', '.join(left_out))}" if left_out else ""
     panel.set_xlabel(f"{shortened(title)}{f' [{unit}]' if unit else ''}; n = {n} scenes{more}")
-    kind = "scene" if name.startswith("scene.") else "detector parameter"
+    kind = "parameter of the scenes" if name.startswith("scene.") else "parameter of the detector"
     panel.set_title(kind, loc="left", fontsize=10)
     if len(values) <= 7:
         panel.set_xticks(

@@ -316,16 +316,22 @@ def _notes(boards: Sequence[_Tally], scenes: Sequence[str]) -> tuple[str, ...]:
 
 
 def _estimates(rows: Sequence[RunRow], store: Store) -> Iterator[str]:
-    """Yield what was estimated for lack of data, such as a ground without a DEM, with the scenes concerned."""
-    scene_of = {row.id: row.scene for row in rows}
-    scenes: dict[str, dict[str, None]] = {}
-    for run, notes in sorted(store.run_notes(scene_of).items()):
+    """Yield what was estimated for lack of data, such as a ground without a DEM, with the scenes concerned.
+
+    The detectors are named where others have a result on these scenes without that note.
+    """
+    row_of = {row.id: row for row in rows}
+    scenes: dict[str, dict[str, dict[str, None]]] = {}
+    for run, notes in sorted(store.run_notes(row_of).items()):
         for note in notes:
-            scenes.setdefault(note, {})[scene_of[run]] = None
-    for note, names in list(scenes.items())[:_MOST_ESTIMATES]:
-        some = list(names)[:_MOST_SCENES]
-        more = f" and {len(names) - len(some)} more" if len(names) > len(some) else ""
-        yield f"{', '.join(some)}{more}: {note}"
+            scenes.setdefault(note, {}).setdefault(row_of[run].scene, {})[row_of[run].label] = None
+    for note, noted in list(scenes.items())[:_MOST_ESTIMATES]:
+        some = list(noted)[:_MOST_SCENES]
+        more = f" and {len(noted) - len(some)} more" if len(noted) > len(some) else ""
+        without = any(row.scene in noted and row.status == "ok" and row.label not in noted[row.scene] for row in rows)
+        labels = dict.fromkeys(label for found in noted.values() for label in found)
+        whose = f"{', '.join(labels)} on " if without else ""
+        yield f"{whose}{', '.join(some)}{more}: {note}"
     if len(scenes) > _MOST_ESTIMATES:
         yield f"{len(scenes) - _MOST_ESTIMATES} further estimates; 'roofbench why RUN' shows those of a run"
 

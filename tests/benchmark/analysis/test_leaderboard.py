@@ -253,7 +253,7 @@ def test_a_note_of_several_runs_stands_once_with_its_scenes():
     runs.notes[1] = ("no DEM", "no point")
     assert runs.board().notes[-2:] == (
         "hamlet-1, hamlet-2, hamlet-3, hamlet-4 and 2 more: no DEM",
-        "hamlet-1: no point",
+        "one on hamlet-1: no point",
     )
 
 
