@@ -8,21 +8,23 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...core.errors import ParameterError
 from ...core.parameters import parameter
-from ...scenes.geodata.footprints import Footprints
+from ...scenes.geodata.footprints import Footprints, stacked
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..steps import MapPanel, OutlineLayer, Role, Step
+from ..tiling import tiles_over
 from .cells import FEWEST_POINTS, cell_size, has_points
 from .mpp_steps import convergence_step
 from .parameters import check_sides
@@ -47,6 +49,9 @@ _LEAST_SPREAD = 0.1
 _CAPACITY = 5000
 #: Rows of the recorded convergence.
 _ROWS = 100
+#: Metres: side of the squares of a city, what their chains see around them (half the diagonal of the largest building),
+#: and the smallest side.
+_SQUARE, _MARGIN, _LEAST_SQUARE = 256.0, 86.0, 32.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +62,8 @@ class MPPPrinted(Detector):
     paper = "Yu, Li, Guan & Wang 2013, Remote Sensing Letters 4(11), doi:10.1080/2150704X.2013.846487"
     requires: ClassVar[tuple[str, ...]] = ("points",)
     stochastic: ClassVar[bool] = True
-    halo: ClassVar[float] = 340.0
+    place_streams: ClassVar[bool] = True
+    halo: ClassVar[float] = _SQUARE + _MARGIN
 
     heights: str = parameter(
         "elevation",
@@ -172,27 +178,56 @@ class MPPPrinted(Detector):
         0.5, minimum=1e-6, maximum=1, doc="p_f", source="Yu et al. 2013, equation 7; no value printed"
     )
     iterations: int = parameter(30000, minimum=1, doc="T_m", source="Yu et al. 2013, section 2.4 (1); no value printed")
+    square: float = parameter(
+        0.0,
+        unit="m",
+        minimum=0,
+        maximum=_SQUARE,
+        doc="side of the squares of a fixed grid with a chain each; 0: one chain over all, as printed; cities take 256",
+        source="roofbench",
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_sides(self.name, self.least_side, self.largest_side)
+        if 0 < self.square < _LEAST_SQUARE:
+            raise ParameterError(f"{self.name}: square={self.square:g} must be 0 or at least {_LEAST_SQUARE:g} m")
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Return rectangles with the attributes nu and tau (metres), and the record of the run."""
         seed = int(rng.integers(2**63))
         seen = scene.for_detection()
         seen.require(self.requires)
+        return self._chain(seen, [seed]) if self.square == 0 else self._squares(seen, seed)
+
+    def _squares(self, seen: Scene, seed: int) -> Footprints:
+        """Return the buildings of every square that meets the core, found by a chain in it and a margin around it."""
+        parts, seconds = [], {"preparation": 0.0, "sampling": 0.0}
+        for square in tiles_over(seen.core, self.square):
+            part = seen.window(square.core, _MARGIN)
+            found = self._chain(part, [seed, square.column % 2**32, square.row % 2**32])
+            if len(found):
+                parts.append(found.take(square.owns(found.centres, seen.extent)))
+                for name in seconds:
+                    seconds[name] += found.metadata["seconds"][name]
+        if not parts:
+            return Footprints.empty(crs=seen.crs, source=self.name)
+        record = {"seed": seed, "squares": len(parts), "seconds": seconds}
+        return replace(stacked(parts), ids=np.arange(sum(map(len, parts))), metadata=record)
+
+    def _chain(self, seen: Scene, entropy: Sequence[int]) -> Footprints:
+        """Return the buildings of one chain over all that is seen."""
         points = seen.points
         assert points is not None
         if not has_points(points.z):
-            return Footprints.empty(crs=scene.crs, source=self.name)
+            return Footprints.empty(crs=seen.crs, source=self.name)
         began = time.perf_counter()
         grid = Grid.covering(seen.extent, self.cell or cell_size(points.x, points.y, seen.extent))
         index, inside = grid.cells(points.x, points.y)
         above = seen.heights.above(points)
         inside &= np.isfinite(above)
         if np.count_nonzero(inside) < FEWEST_POINTS:
-            return Footprints.empty(crs=scene.crs, source=self.name)
+            return Footprints.empty(crs=seen.crs, source=self.name)
         points, index = points.take(inside), index[inside]
         known = above[inside].astype(np.float64)
         z = points.z if self.heights == "elevation" else known
@@ -211,10 +246,10 @@ class MPPPrinted(Detector):
             sum_table(index, z - base, grid.shape),
             self._model(gaussians, base, grid.gsd),
             self._schedule(grid.gsd, gaussians["ground"][0] - base),
-            stream([seed]),
+            stream(entropy),
         )
         record: dict[str, Any] = {
-            "seed": seed,
+            "seed": entropy[0],
             "cell": grid.gsd,
             "gaussians": {name: list(pair) for name, pair in gaussians.items()},
             "energy": float(trace[:, PrintedTrace.ENERGY].min()),
@@ -223,24 +258,28 @@ class MPPPrinted(Detector):
         }
         return Footprints.of(
             shapely.polygons(to_world(best[:, : ANGLE + 1], grid)),
-            crs=scene.crs,
+            crs=seen.crs,
             attributes={"nu": best[:, NU] + base, "tau": best[:, TAU]},
             metadata=record,
             source=self.name,
         )
 
     def measured(self, scene: Scene) -> Mapping[str, float]:
-        """Return the cell size, unless it is given."""
+        """Return what the tiles of a city share: the cell size and the squares, unless they are given."""
         points = scene.points
-        if self.cell is not None or points is None or not len(points):
+        if points is None or not len(points):
             return {}
-        return {"cell": cell_size(points.x, points.y, scene.extent)}
+        found = {} if self.square else {"square": _SQUARE}
+        if self.cell is None:
+            found["cell"] = cell_size(points.x, points.y, scene.extent)
+        return found
 
     def steps(self, scene: Scene, rng: np.random.Generator) -> Iterator[Step]:
-        """Yield the convergence and the rectangles of the same run."""
+        """Yield the convergence, where there is one chain, and the rectangles of the same run."""
         found = self.detect(scene, rng)
         if "trace" in found.metadata:
             yield convergence_step(found.metadata["trace"])
+        if found.metadata:
             layer = OutlineLayer(found.polygons, "building", Role.RESULT)
             panel = MapPanel(extent=scene.extent, layers=(layer,))
             yield Step("buildings", "Buildings of the state with the highest posterior.", (panel,))

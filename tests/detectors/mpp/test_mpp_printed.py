@@ -9,6 +9,7 @@ import pytest
 import shapely
 from naive import mpp as naive
 
+from roofbench.core.errors import ParameterError
 from roofbench.detectors.mpp.printed_chain import Operation, PrintedSchedule, PrintedTrace, run_printed
 from roofbench.detectors.mpp.printed_detector import class_gaussians
 from roofbench.detectors.mpp.printed_model import (
@@ -31,6 +32,8 @@ from roofbench.detectors.mpp.printed_model import (
 from roofbench.detectors.mpp.random_stream import stream
 from roofbench.detectors.mpp.rectangles import overlap_area
 from roofbench.detectors.registry import make_detector
+from roofbench.detectors.seams import join_tiles
+from roofbench.detectors.tiling import measure, owned, stream_of, tiles_over
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid
 from roofbench.scenes.scene import Scene
@@ -285,3 +288,52 @@ def test_the_steps_show_the_convergence_and_the_rectangles_of_the_same_run():
     assert [step.name for step in steps] == ["convergence", "buildings"]
     shown = steps[1].panels[0].layers[0].polygons
     assert shapely.to_wkb(shown).tolist() == shapely.to_wkb(run().polygons).tolist()
+
+
+# Squares of a city
+
+
+def street(width=1100.0, height=160.0):
+    """Return a scene of flat ground with a house every 40 m."""
+    rng = np.random.default_rng(7)
+    x, y = rng.uniform(0, width, 20_000), rng.uniform(0, height, 20_000)
+    roof = (x % 40 > 12) & (x % 40 < 28) & (np.abs(y - 80) < 6)
+    z = np.where(roof, 6.0, 0.0) + rng.normal(0.0, 0.05, len(x))
+    ones = np.ones(len(x), dtype=np.uint8)
+    grid = Grid.covering((0.0, 0.0, width, height), 10.0)
+    dem = Elevation(np.zeros(grid.shape, dtype=np.float32), grid)
+    points = PointCloud(x, y, z, return_number=ones, number_of_returns=ones)
+    return Scene("street", (0.0, 0.0, width, height), crs="EPSG:25832", points=points, dem=dem)
+
+
+@pytest.mark.parametrize("side", [256.0, 300.0])
+def test_tiles_find_what_the_whole_finds_square_by_square(side):
+    town = street()
+    detector = make_detector("mpp-printed[iterations=4000,buildings=20]")
+    measured = measure(town, detector, tiles_over(town.extent, side))
+    assert measured.parameters["square"] == 256.0
+    fixed = detector.replaced(measured.parameters)
+    whole = fixed.detect(town, np.random.default_rng([0]))
+    parts = {}
+    for tile in tiles_over(town.extent, side):
+        window = town.window(tile.core, fixed.halo)
+        found = fixed.detect(window, stream_of(0, tile, fixed))
+        parts[tile] = owned(found, tile, window.extent, town.extent)
+    tiled, seams = join_tiles(parts, crs=town.crs)
+    assert len(whole) > 8
+    assert sorted(shapely.to_wkb(tiled.polygons).tolist()) == sorted(shapely.to_wkb(whole.polygons).tolist())
+    assert not any(seams)
+
+
+def test_without_squares_one_chain_sees_all_as_printed():
+    town = street(200.0)
+    alone, squares = (make_detector(f"mpp-printed[iterations=2000,buildings=5,square={side}]") for side in (0, 64))
+    one, many = (detector.detect(town, np.random.default_rng(0)) for detector in (alone, squares))
+    assert "trace" in one.metadata
+    assert many.metadata["squares"] > 1
+    assert [step.name for step in squares.steps(town, np.random.default_rng(0))] == ["buildings"]
+
+
+def test_squares_smaller_than_a_house_are_refused():
+    with pytest.raises(ParameterError, match="at least 32 m"):
+        make_detector("mpp-printed[square=8]")
