@@ -26,6 +26,8 @@ _ALONE = 0.97
 #: Weight of area covered outside the footprint against area inside. With 1 or 2 a rectangle over a whole court can win
 #: against its wings; with more than 4 slanting ends are cut into many small ones.
 _OUTSIDE = 3
+#: Degrees between directions that count as two, in turn, until the rectangles are so similar to the footprint.
+_APART, _FITS = (3.5, 0.5), 0.9
 #: Most lines per direction; footprints with more vertices (round ones) are cut more coarsely.
 _MOST_LINES = 28
 
@@ -108,15 +110,34 @@ def decompose(polygon: shapely.Geometry, *, tolerance: float = 0.5, smallest: fl
     if polygon.geom_type == "MultiPolygon":
         pieces = sorted(shapely.get_parts(polygon), key=lambda piece: -piece.area)
         return [part for piece in pieces for part in decompose(piece, tolerance=tolerance, smallest=smallest)]
-    middle, grid = _middle_and_grid(polygon)
+    middle, _ = _middle_and_grid(polygon)
     centred = shapely.transform(polygon, lambda points: points - middle)
     box = _least_box(shapely.get_coordinates(centred))
     if centred.area >= _ALONE * _area(box):
         return [box + middle]
-    first, *others = _directions(centred)
-    # All overlays happen in the frame of the longest walls and on a grid, where they cannot fail.
-    uncovered = shapely.set_precision(shapely.transform(centred, lambda points: _turn(points, -first)), grid)
     least = max(smallest, 0.01 * polygon.area)
+    parts: list[NDArray[np.float64]] = []
+    similar = -1.0
+    # Walls of one direction differ by some degrees where they were drawn by hand. Where that fits badly, wings that
+    # differ by as little may be meant.
+    for apart in _APART:
+        found = _parts(centred, _directions(centred, apart), tolerance, least) or [box]
+        common, union = _common_and_union(centred, found)
+        if common / union > similar:
+            parts, similar = found, common / union
+        if similar >= _FITS:
+            break
+    return [part + middle for part in parts]
+
+
+def _parts(
+    polygon: shapely.Geometry, directions: list[float], tolerance: float, least: float
+) -> list[NDArray[np.float64]]:
+    """Return the rectangles, in any of some directions, of a footprint around the origin; each brings a least area."""
+    _, grid = _middle_and_grid(polygon)
+    first, *others = directions
+    # All overlays happen in the frame of the longest walls and on a grid, where they cannot fail.
+    uncovered = shapely.set_precision(shapely.transform(polygon, lambda points: _turn(points, -first)), grid)
     boards = [_Board(uncovered, angle - first, tolerance) for angle in (first, *others)]
     parts: list[NDArray[np.float64]] = []
     while True:
@@ -126,12 +147,12 @@ def decompose(polygon: shapely.Geometry, *, tolerance: float = 0.5, smallest: fl
         if value < least and (parts or value <= 0):
             break
         part = boards[winner].take(block)
-        parts.append(_turn(part, first) + middle)
+        parts.append(_turn(part, first))
         left = shapely.difference(uncovered, shapely.set_precision(shapely.Polygon(part), grid), grid_size=grid)
         uncovered = polygonal_part(left, grid_size=grid)
         for board in boards:
             board.update(uncovered)
-    return parts or [box + middle]
+    return parts
 
 
 def _middle_and_grid(polygon: shapely.Geometry) -> tuple[NDArray[np.float64], float]:
@@ -232,14 +253,18 @@ def _cell_areas(edges: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[n
     return np.asarray(np.diff(np.diff(areas.T, axis=0), axis=1))
 
 
-def _directions(polygon: shapely.Polygon) -> list[float]:
-    """Return up to three directions of the walls, radians, the one with the longest walls first."""
+def _directions(polygon: shapely.Polygon, apart: float) -> list[float]:
+    """Return up to three directions of the walls, radians, the one with the longest walls first.
+
+    The weight of a wall for a direction falls to 1/e at a distance of `apart` degrees.
+    """
     edges = np.concatenate(
         [np.diff(shapely.get_coordinates(ring), axis=0) for ring in (polygon.exterior, *polygon.interiors)]
     )
     angle, length = np.arctan2(edges[:, 1], edges[:, 0]), np.hypot(edges[:, 0], edges[:, 1])
     # Directions count modulo 90 degrees; four times the angle makes them periodic.
-    near = np.exp((np.cos(4 * (angle[:, None] - angle[None, :])) - 1) / 0.03)  # falls to 1/e at 3.5 degrees
+    width = 1 - np.cos(4 * np.radians(apart))
+    near = np.exp((np.cos(4 * (angle[:, None] - angle[None, :])) - 1) / width)
     left = length.copy()
     found: list[float] = []
     while len(found) < 3 and left.sum() > 0.15 * length.sum():

@@ -1,7 +1,7 @@
 """How much random tests try.
 
-The environment variable ``ROOFBENCH_TESTS`` chooses: not set (by hand), hypothesis draws other examples every time;
-``ci``, the same examples every time; ``nightly``, others every time and many more of them.
+Property tests draw the same examples every time. With the environment variable ``ROOFBENCH_TESTS=nightly`` they draw
+others every time, and many more of them.
 """
 
 import os
@@ -10,8 +10,7 @@ from hypothesis import HealthCheck, settings
 
 __all__ = ["NIGHTLY", "examples", "of", "use_profile"]
 
-MODE = os.environ.get("ROOFBENCH_TESTS", "by-hand")
-NIGHTLY = MODE == "nightly"
+NIGHTLY = os.environ.get("ROOFBENCH_TESTS") == "nightly"
 
 
 def of(usual: int, nightly: int) -> int:
@@ -29,7 +28,7 @@ def use_profile() -> None:
     settings.register_profile(
         "roofbench",
         deadline=None,
-        derandomize=MODE == "ci",
+        derandomize=not NIGHTLY,
         print_blob=True,
         max_examples=of(100, 1000),
         suppress_health_check=[HealthCheck.too_slow],
