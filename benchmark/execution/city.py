@@ -245,9 +245,8 @@ def run_tiles(
     if not jobs:
         return failed
     local = execution.jobs == 0 and execution.scheduler is None
-    with slots_of(execution.jobs, execution.scheduler, len(jobs)) as slots:
-        # Which worker of a cluster gets a task is not known here.
-        queue = _Queue(jobs, ahead=execution.scheduler is None)
+    with slots_of(execution.jobs, execution.scheduler, len(jobs), by_worker=True) as slots:
+        queue = _Queue(jobs)
         flying: dict[Future[bytes], tuple[_Job, int]] = {}
         turns = range(max(slot.capacity for slot in slots))
         free = [number for turn in turns for number, slot in enumerate(slots) if turn < slot.capacity]
@@ -255,7 +254,7 @@ def run_tiles(
         while queue or flying:
             while queue and free:
                 number = free.pop(0)
-                job, following = queue.next_for(number)
+                job, following = queue.next_for(number, ahead=slots[number].reads_ahead)
                 submit = slots[number].executor.submit
                 text = replace(job.task, ahead=following).to_json()
                 future = submit(execute_text, text) if local else submit(call_isolated, text, execution.limits)
@@ -273,17 +272,16 @@ def run_tiles(
 
 
 class _Queue:
-    """Waiting tiles. Each slot has its next tile reserved, so that a task can name what its worker is to read ahead."""
+    """Waiting tiles. A slot that reads ahead has its next tile reserved, so that a task can name it to its worker."""
 
-    def __init__(self, jobs: Sequence[_Job], *, ahead: bool) -> None:
+    def __init__(self, jobs: Sequence[_Job]) -> None:
         self._waiting = list(reversed(jobs))
-        self._ahead = ahead
         self._reserved: dict[int, _Job] = {}
 
     def __bool__(self) -> bool:
         return bool(self._waiting or self._reserved)
 
-    def next_for(self, slot: int) -> tuple[_Job, Tile | None]:
+    def next_for(self, slot: int, *, ahead: bool) -> tuple[_Job, Tile | None]:
         """Return the next job of a slot, at the end one that is reserved for another slot, and the tile after it."""
         if slot in self._reserved:
             job = self._reserved.pop(slot)
@@ -291,7 +289,7 @@ class _Queue:
             job = self._waiting.pop()
         else:
             job = self._reserved.pop(min(self._reserved))
-        if not self._ahead or not self._waiting:
+        if not ahead or not self._waiting:
             return job, None
         self._reserved[slot] = self._waiting.pop()
         return job, self._reserved[slot].tile

@@ -12,7 +12,7 @@ import pytest
 from builders.town import town_folder
 
 from roofbench.benchmark.execution.city import City, detect_city
-from roofbench.benchmark.execution.executors import Execution
+from roofbench.benchmark.execution.executors import Execution, slots_of
 from roofbench.benchmark.execution.isolation import close_isolated
 from roofbench.benchmark.execution.runner import run_plan
 from roofbench.benchmark.identity.recipes import SceneRecipe
@@ -65,6 +65,27 @@ def test_limits_hold_on_a_cluster(suite, tmp_path, misbehaving):
         found = run(hanging, tmp_path / "a.sqlite", execution)
     close_isolated()
     assert {reason for _, reason, *_ in found.values()} == {"time limit of 2 s exceeded"}
+
+
+def address_of_worker():
+    return distributed.get_worker().address
+
+
+def test_each_worker_of_a_cluster_is_a_slot_for_tiles_and_reads_ahead_with_one_thread():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
+    ) as cluster:
+        with slots_of(1, cluster.scheduler_address, 9, by_worker=True) as slots:
+            ran_on = [[slot.executor.submit(address_of_worker).result() for _ in range(3)] for slot in slots]
+        assert [(slot.capacity, slot.reads_ahead) for slot in slots] == [(2, True), (2, True)]
+        assert [set(addresses) for addresses in ran_on] == [{address} for address in sorted(cluster.scheduler.workers)]
+        with slots_of(1, cluster.scheduler_address, 9) as slots:
+            assert [(slot.capacity, slot.reads_ahead) for slot in slots] == [(5, False)]
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0") as cluster,
+        slots_of(1, cluster.scheduler_address, 9, by_worker=True) as slots,
+    ):
+        assert [(slot.capacity, slot.reads_ahead) for slot in slots] == [(3, False)]
 
 
 @contextmanager
