@@ -21,9 +21,10 @@ from .palettes import PALETTES, draw_colour
 from .parcels import Parcel, Sites
 from .recipe import SceneParameters
 from .roofscape import furnish
-from .row_houses import compose_row, is_row
+from .row_houses import MOST_HOUSES, compose_row, is_row
 from .solids import Roof, Solid, Texture
 from .streams import Draws, stream
+from .wall_tops import DRAWS_OF_WALL, has_chimney, wall_tops
 
 __all__ = ["Town", "build"]
 
@@ -75,6 +76,7 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
     garages: list[tuple[int, Solid]] = []
     built = np.zeros(len(sites), dtype=bool)
     rows = stream(seed, "rows").random((len(sites), _ROW_DRAWS)) if recipe.row_share > 0 else None
+    walls = stream(seed, "party-walls").random((0 if rows is None else len(sites), MOST_HOUSES + 1, DRAWS_OF_WALL))
     taken = _Taken(len(sites) * (8 if rows is None else _MOST_PARTS))
     number = counted = 0
     for site in np.argsort(sites.mark, kind="stable"):
@@ -102,11 +104,18 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
                 # Houses of a row that do not differ have the colours of the first one.
                 look = numbers if numbers[-1] < _OWN_COLOUR + recipe.row_variety else rows[site]
                 _paint(group, 0, zone, recipe, Draws(look), Draws(look[6:]))
-                structures = furnish(group, zone, Draws(numbers[8:]))
+                beside = [place for place in (rank, rank + 1) if 0 < place < len(groups)]
+                free = not any(has_chimney(walls[site, place, 0], recipe) for place in beside)
+                structures = furnish(group, zone, Draws(numbers[8:]), chimney=free)
             else:
                 _paint(group, rank, zone, recipe, Draws(colours[site][rank * 6 :]), Draws(greens[site][rank * 2 :]))
                 structures = furnish(group, zone, Draws(roofs[site][rank * 48 :])) if rank == 0 else []
             floor = float(terrain.sample(group[0].x, group[0].y))
+            if in_row:
+                group[0].base = floor
+                if rank:
+                    left = groups[rank - 1][0]
+                    structures += wall_tops(parcel, recipe, left, group[0], Draws(walls[site, rank]))
             taken.add(group)
             for solid in (*group, *structures):
                 solid.owner, solid.base = number, floor

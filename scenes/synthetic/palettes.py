@@ -10,10 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["GROUND", "LAWNS", "PALETTES", "Colour", "Palette", "draw_colour", "shaded"]
+__all__ = ["BRICK", "GROUND", "LAWNS", "PALETTES", "Colour", "Palette", "draw_colour", "shaded"]
 
 Colour = tuple[float, float, float, float]
 Palette = Sequence[tuple[float, Colour]]
+
+#: Chimneys and parapets.
+BRICK: Colour = (0.50, 0.34, 0.28, 0.44)
 
 PALETTES: dict[str, Palette] = {
     "australian": (

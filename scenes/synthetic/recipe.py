@@ -98,6 +98,20 @@ class SceneParameters(Parameterised):
     row_gables: float = parameter(
         0.2, minimum=0, maximum=1, doc="share of rows in which each house turns its gable to the street"
     )
+    row_chimneys: float = parameter(
+        0.0,
+        minimum=0,
+        maximum=1,
+        doc="share of party walls of rows with a chimney at the ridge; houses beside one have no other",
+        swept=(0, 0.5, 1),
+    )
+    row_parapets: float = parameter(
+        0.0,
+        minimum=0,
+        maximum=1,
+        doc="share of party walls of rows that end 0.3 to 0.6 m above the roofs",
+        swept=(0, 0.5, 1),
+    )
     building_size: float = parameter(
         1.0, minimum=0.4, maximum=1.6, doc="factor on the sides of buildings", swept=(0.6, 0.8, 1.0, 1.2)
     )

@@ -9,12 +9,11 @@ import math
 from typing import Protocol
 
 from .layout import HALLS, TOWERS
-from .palettes import shaded
+from .palettes import BRICK, shaded
 from .solids import Body, Roof, Solid, Texture
 
 __all__ = ["furnish"]
 
-_BRICK = (0.50, 0.34, 0.28, 0.44)
 _PANEL = (0.13, 0.15, 0.23, 0.15)
 _STEEL = (0.70, 0.71, 0.72, 0.66)
 _GLASS = (0.62, 0.70, 0.74, 0.55)
@@ -63,23 +62,23 @@ def roof_height(host: Solid, along: float, across: float) -> float:
     return host.eave + host.pitch * inwards
 
 
-def furnish(group: list[Solid], zone: int, draws: Numbers) -> list[Solid]:
-    """Return the structures on the roofs of a building: chimneys, dormers, plant."""
+def furnish(group: list[Solid], zone: int, draws: Numbers, *, chimney: bool = True) -> list[Solid]:
+    """Return the structures on the roofs of a building: dormers, plant, and on pitched roofs of houses a chimney."""
     host = group[0]
     if zone == TOWERS:
         return [item for part in group for item in _plant(part, draws)]
     if zone == HALLS:
         return _ridge_vents(host, draws)
-    return _domestic(host, draws)
+    return _domestic(host, draws, chimney)
 
 
-def _domestic(host: Solid, draws: Numbers) -> list[Solid]:
+def _domestic(host: Solid, draws: Numbers, with_chimney: bool) -> list[Solid]:
     items = []
     chimney, panels, dormer, cooler = draws.unit(), draws.unit(), draws.unit(), draws.unit()
     along, across = draws.between(-0.3, 0.3) * host.length, draws.between(0.05, 0.2) * host.width
     if host.roof in (Roof.GABLE, Roof.HIP):
-        if chimney < 0.6:
-            items.append(_on(host, along, across, 0.7, 0.55, 0.9, colour=_BRICK, wall=_BRICK))
+        if with_chimney and chimney < 0.6:
+            items.append(_on(host, along, across, 0.7, 0.55, 0.9, colour=BRICK, wall=BRICK))
         side = 1.0 if draws.chance(0.5) else -1.0
         if panels < 0.22:
             items += _panels(host, side, draws)

@@ -6,7 +6,7 @@ row
     Houses that share party walls, under one ridge along the street or each with a gable that faces it.
 variety
     Share of the party walls at which eaves and fronts step, and the spread of widths and depths. Without it a row is
-    one long roof, and nothing but chimneys shows where one house ends.
+    one long roof, and nothing shows where one house ends but colours and what stands on the walls (`wall_tops`).
 annex
     A low flat part behind a house, of the same building.
 """
@@ -20,10 +20,10 @@ from .recipe import SceneParameters
 from .solids import Roof, Solid
 from .streams import Draws
 
-__all__ = ["compose_row", "is_row"]
+__all__ = ["MOST_HOUSES", "compose_row", "is_row"]
 
 #: Most houses of a row.
-_MOST = 10
+MOST_HOUSES = 10
 
 
 def is_row(parcel: Parcel, recipe: SceneParameters) -> bool:
@@ -35,7 +35,7 @@ def compose_row(parcel: Parcel, recipe: SceneParameters, draws: Draws) -> list[l
     """Return the parts of each house of a row, in order along the street."""
     variety = recipe.row_variety
     usable = parcel.width - max(0.4, recipe.gap * draws.between(0.7, 1.3))
-    count = min(max(2, round(usable / (recipe.row_house_width * draws.between(0.9, 1.1)))), _MOST)
+    count = min(max(2, round(usable / (recipe.row_house_width * draws.between(0.9, 1.1)))), MOST_HOUSES)
     deep = min(draws.between(8.0, 10.5) * recipe.building_size, parcel.depth - recipe.setback - 3)
     front = -parcel.depth / 2 + recipe.setback * draws.between(0.8, 1.25)
     eave = recipe.storey_height * (2 if draws.chance(recipe.two_storeys) else 1) * draws.between(0.94, 1.06)

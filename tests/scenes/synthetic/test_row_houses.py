@@ -72,3 +72,39 @@ def test_a_single_return_scanner_writes_one_of_one():
 def test_a_row_is_the_same_whatever_stands_elsewhere():
     few, many = (rb.make_scene("rows-small", seed=4, buildings=count) for count in (12, 30))
     np.testing.assert_array_equal(few.reference.polygons[:8], many.reference.polygons[:8])
+
+
+ROW = {"row_share": 1.0, "row_gables": 0.0, "outbuildings": 0.0, "slope": 4.0, "buildings": 30}
+
+
+def outline(rectangle):
+    x, y, angle, length, width = rectangle
+    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    ends = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    return shapely.Polygon([(x, y) + a * length / 2 * along + b * width / 2 * across for a, b in ends])
+
+
+@pytest.mark.parametrize(("kind", "deep"), [("row_chimneys", (0.7, 1.6)), ("row_parapets", (6.0, 11.0))])
+def test_chimneys_and_parapets_stand_on_party_walls_above_both_roofs(kind, deep):
+    plain, made = (make_world(preset("rows-small", **ROW, **{kind: share}), 3).solids for share in (0.0, 1.0))
+    houses_, ridges = (values[made.body == Body.BUILDING] for values in (made.rectangle, made.ridge))
+    np.testing.assert_array_equal(houses_, plain.rectangle[plain.body == Body.BUILDING])
+    new = ~(made.rectangle[:, None] == plain.rectangle).all(axis=2).any(axis=1)
+    assert new.sum() > 15
+    outlines = np.array([outline(one) for one in houses_])
+    for place, top in zip(made.rectangle[new], made.ridge[new], strict=True):
+        own = outline(place)
+        near = np.flatnonzero(shapely.dwithin(own, outlines, 0.01))
+        assert len(near) == 2
+        common = shapely.area(shapely.intersection(own, outlines[near]))
+        assert common.min() > 0.3 * common.max()
+        assert 0.29 < top - ridges[near].max() < 1.01
+        assert deep[0] <= place[3:].max() <= deep[1]
+
+
+def test_houses_beside_a_wall_with_a_chimney_have_no_other():
+    bricks = [
+        (make_world(preset("rows-small", **ROW, row_chimneys=share), 3).solids.rectangle[:, 3:] == (0.7, 0.55))
+        for share in (0.0, 1.0)
+    ]
+    assert [one.all(axis=1).sum() > 5 for one in bricks] == [True, False]
