@@ -171,7 +171,7 @@ class NDSM(Detector):
             roof=roof,
             mask=mask,
             traced=traced,
-            footprints=self._footprints(traced, cues, likeness, scene.crs, information),
+            footprints=self._footprints(traced, mask, cues, likeness, scene.crs, information),
         )
 
     def measured(self, scene: Scene) -> Mapping[str, float]:
@@ -228,12 +228,13 @@ class NDSM(Detector):
     def _footprints(
         self,
         traced: NDArray[np.object_],
+        mask: _Mask,
         cues: CellCues,
         likeness: _Floats,
         crs: str | None,
         information: CueInformation,
     ) -> Footprints:
-        height, looks = _means_inside(traced, cues.grid, cues.height, likeness)
+        height, looks = _means_inside(traced, mask, cues.grid, cues.height, likeness)
         if self.outline == "rectangle":
             polygons = minimum_rectangles(traced)
         else:
@@ -281,19 +282,35 @@ def _averaged(likeness: _Floats, high: _Mask, sigma: float) -> _Floats:
     return np.where(known, total / np.where(known, weight, 1), likeness)
 
 
-def _means_inside(polygons: NDArray[np.object_], grid: Grid, *rasters: _Floats) -> list[NDArray[np.float64]]:
-    """Return per raster the mean of its known cells inside each polygon; NaN where none is known."""
-    from rasterio.features import rasterize
-    from rasterio.transform import Affine
+def _means_inside(
+    polygons: NDArray[np.object_], mask: _Mask, grid: Grid, *rasters: _Floats
+) -> list[NDArray[np.float64]]:
+    """Return per raster the mean of its known cells inside each polygon traced around a mask; NaN where none is known.
 
+    A traced polygon contains whole components of its mask, and no other cell centre.
+    """
     if len(polygons) == 0:
         return [np.empty(0) for _ in rasters]
-    shapes = ((polygon, number) for number, polygon in enumerate(polygons, start=1))
-    owner = rasterize(shapes, out_shape=grid.shape, transform=Affine(*grid.transform), dtype=np.int32)
+    cells, component = np.flatnonzero(mask), _components(mask)
+    # One cell stands for each component.
+    row, column = np.divmod(cells[np.unique(component, return_index=True)[1]], grid.columns)
+    inside, polygon = shapely.STRtree(polygons).query(shapely.points(*grid.to_world(row + 0.5, column + 0.5)), "within")
+    owner_of = np.full(len(row) + 1, len(polygons))
+    owner_of[inside + 1] = polygon
+    owner = owner_of[component]
     means = []
     for raster in rasters:
-        known = np.isfinite(raster) & (owner > 0)
-        count = np.bincount(owner[known], minlength=len(polygons) + 1)[1:]
-        total = np.bincount(owner[known], weights=raster[known], minlength=len(polygons) + 1)[1:]
+        values = raster.ravel()[cells]
+        known = np.isfinite(values)
+        count = np.bincount(owner[known], minlength=len(polygons) + 1)[:-1]
+        total = np.bincount(owner[known], weights=values[known], minlength=len(polygons) + 1)[:-1]
         means.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
     return means
+
+
+def _components(mask: _Mask) -> NDArray[np.int32]:
+    """Return the number, from 1, of the connected component of each cell of a mask, in the order of the cells."""
+    import cv2
+
+    labels: NDArray[np.int32] = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)[1][mask]
+    return labels

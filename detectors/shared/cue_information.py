@@ -95,7 +95,7 @@ def informative_cues(
     """
     ratings = {name: rating for name, rating in ratings.items() if name not in known_silent}
     untested = _GEOMETRIC | set(independent)
-    values = {name: np.where(among, rating, np.float32(np.nan))[among] for name, rating in ratings.items()}
+    values = {name: rating[among] for name, rating in ratings.items()}
     silent = dict(known_silent)
     silent |= {name: "the points do not record it" for name, rating in values.items() if not np.isfinite(rating).any()}
     for name in sorted(untested - {ANCHOR} - silent.keys()):

@@ -22,7 +22,9 @@ Axis order (row, column), row 0 northernmost. Cells without a value are NaN.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +50,8 @@ _FLATTEST = 1e-3
 _BLOCK, _GROUND = 2.0, 1.0
 #: Cells of a strip.
 _STRIP = 1_000_000
+#: Stands for the numbers of returns of a cloud without them.
+_NO_RETURNS = np.empty(0, dtype=np.uint8)
 #: Deviation where there is no plane: larger than any real one.
 _NO_PLANE = np.float32(1e9)
 
@@ -103,18 +107,10 @@ def cell_cues(
         Width in metres of the windows in which planes are fitted; at least two cells.
     """
     index, inside = grid.cells(points.x, points.y)
-    used = np.flatnonzero(inside & np.isfinite(heights))
-    size = grid.rows * grid.columns
-    high = used[heights[used] > threshold]
-    count = _on_grid(np.bincount(index[used], minlength=size), grid)
-    n_high = _on_grid(np.bincount(index[high], minlength=size), grid)
-    sums = np.bincount(index[high], weights=heights[high], minlength=size)
-
-    multiple_share = None
     returns = points.number_of_returns
-    if returns is not None and (returns[used] > 1).any():
-        multiple = _on_grid(np.bincount(index[high[returns[high] > 1]], minlength=size), grid)
-        multiple_share = _share(_box(multiple), _box(n_high))
+    found = _tally(index, inside, heights, _NO_RETURNS if returns is None else returns, threshold, grid.shape)
+    count, n_high, multiple, sums, high, low, several = found
+    multiple_share = _share(_box(multiple), _box(n_high)) if several else None
     smoothest = _smoothest_plane(points, index, high, grid, max(2, round(window / grid.gsd)))
     shared = _share(_box(n_high), _box(count))
     return CellCues(
@@ -124,14 +120,53 @@ def cell_cues(
         penetration=1 - shared,
         multiple_share=multiple_share,
         roughness=np.where((smoothest < _NO_PLANE) & (n_high > 0), smoothest, np.float32(np.nan)),
-        height=_share(_on_grid(sums, grid), n_high),
-        noise=_noise(points, heights, used, grid),
+        height=_share(sums.astype(np.float32), n_high),
+        noise=_noise(points, heights, low, grid),
     )
 
 
-def _noise(points: PointCloud, heights: NDArray[np.float32], used: NDArray[np.intp], grid: Grid) -> float:
+@kernel
+def _tally(
+    index: NDArray[np.intp],
+    inside: NDArray[np.bool_],
+    heights: NDArray[np.float32],
+    returns: NDArray[np.uint8],
+    threshold: float,
+    shape: tuple[int, int],
+) -> tuple[_Floats, _Floats, _Floats, NDArray[np.float64], NDArray[np.intp], NDArray[np.intp], bool]:
+    """Tally points in their cells; `returns` is empty where the number of returns is not known.
+
+    Returns per cell the number of points, of high points and of high points of several returns, and the sum of the
+    heights of high points; the rows of the high and of the low points; and whether any point has several returns.
+    """
+    size = shape[0] * shape[1]
+    count, n_high = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.float32)
+    multiple, sums = np.zeros(size, dtype=np.float32), np.zeros(size)
+    high, low = np.empty(len(heights), dtype=np.intp), np.empty(len(heights), dtype=np.intp)
+    many, few, several = 0, 0, False
+    least = np.float32(threshold)
+    for i in range(len(heights)):
+        if not (inside[i] and math.isfinite(heights[i])):
+            continue
+        cell = np.uintp(index[i])
+        is_multiple = len(returns) > 0 and returns[i] > 1
+        several |= is_multiple
+        count[cell] += 1
+        if heights[i] > least:
+            n_high[cell] += 1
+            sums[cell] += heights[i]
+            multiple[cell] += is_multiple
+            high[many] = i
+            many += 1
+        if heights[i] < _GROUND:
+            low[few] = i
+            few += 1
+    on_grid = count.reshape(shape), n_high.reshape(shape), multiple.reshape(shape), sums.reshape(shape)
+    return (*on_grid, high[:many], low[:few], several)
+
+
+def _noise(points: PointCloud, heights: NDArray[np.float32], low: NDArray[np.intp], grid: Grid) -> float:
     """Return the noise of the heights of low points, metres; see `CellCues`."""
-    low = used[heights[used] < _GROUND]
     blocks = Grid.covering(grid.extent, max(_BLOCK, grid.gsd))
     index, _ = blocks.cells(points.x[low], points.y[low])
     size, h = blocks.rows * blocks.columns, heights[low].astype(np.float64)
@@ -154,17 +189,36 @@ def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     darkest : float
         Pixels whose brightest band is below this (0..1) are ignored.
     """
-    if {"nir", "red"} <= set(image.bands):
-        more, less = image.band("nir"), image.band("red")
-    elif {"green", "red"} <= set(image.bands):
-        more, less = image.band("green"), image.band("red")
-    else:
+    leaves = next((name for name in ("nir", "green") if {name, "red"} <= set(image.bands)), None)
+    if leaves is None:
         return None
-    bright = np.maximum(more, less)
-    if not bright.any():
+    more, less = (image.values[image.bands.index(name)] for name in (leaves, "red"))
+    if not (more.any() or less.any()):
         return None
-    index = (more - less) / np.maximum(more + less, np.float32(1e-6))
-    return _cell_means((index,), bright >= darkest, image, grid)[0]
+    index, usable = _green_pixels(more, less, np.float32(np.iinfo(more.dtype).max), np.float32(darkest))
+    return _cell_means((index,), usable, image, grid)[0]
+
+
+@kernel
+def _green_pixels(
+    more: NDArray[Any], less: NDArray[Any], white: np.float32, darkest: np.float32
+) -> tuple[_Floats, _Floats]:
+    """Return the index (more - less) / (more + less) of each pixel, and 1 where a band is bright enough, else 0.
+
+    Both are 0 in the dark. Each value is the same to the last bit as that of the arrays of `Image.band`.
+    """
+    rows, columns = more.shape
+    index, usable = np.empty((rows, columns), dtype=np.float32), np.empty((rows, columns), dtype=np.float32)
+    for row in range(rows):
+        for column in range(columns):
+            # np.divide: a loop with an error for division by zero is not vectorised.
+            high = np.divide(np.float32(more[row, column]), white)
+            low = np.divide(np.float32(less[row, column]), white)
+            bright = max(high, low) >= darkest
+            ratio = np.divide(high - low, max(high + low, np.float32(1e-6)))
+            index[row, column] = ratio if bright else np.float32(0)
+            usable[row, column] = np.float32(1) if bright else np.float32(0)
+    return index, usable
 
 
 def chromaticity(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
@@ -177,14 +231,20 @@ def chromaticity(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     red, green, blue = (image.band(name) for name in ("red", "green", "blue"))
     total = np.maximum(red + green + blue, np.float32(1e-6))
     bright = np.maximum(np.maximum(red, green), blue)
-    return np.stack(_cell_means((red / total, blue / total), bright >= darkest, image, grid))
+    usable = (bright >= darkest).astype(np.float32)
+    return np.stack(_cell_means((usable * (red / total), usable * (blue / total)), usable, image, grid))
 
 
-def _cell_means(values: tuple[_Floats, ...], usable: NDArray[np.bool_], image: Image, grid: Grid) -> list[_Floats]:
-    """Return the means of the usable pixels per cell; NaN where more than three quarters of a cell have none."""
+def _cell_means(values: tuple[_Floats, ...], usable: _Floats, image: Image, grid: Grid) -> list[_Floats]:
+    """Return the means of the usable pixels (1, else 0) per cell; NaN where more than three quarters have none.
+
+    Values are 0 where a pixel is not usable.
+    """
     import cv2
 
-    usable = usable if image.valid is None else usable & image.valid
+    if image.valid is not None:
+        usable = usable * image.valid
+        values = tuple(one * image.valid for one in values)
     # Averaging over about one cell before sampling at the cell centres avoids aliasing.
     width = max(1, round(grid.gsd / image.grid.gsd))
     x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)
@@ -200,21 +260,15 @@ def _cell_means(values: tuple[_Floats, ...], usable: NDArray[np.bool_], image: I
         )
         return cells
 
-    weight = sampled(usable.astype(np.float32))
+    weight = sampled(usable)
     known, divisor = weight > 0.25, np.maximum(weight, np.float32(0.25))
-    return [
-        np.where(known, sampled(np.where(usable, one, np.float32(0))) / divisor, np.float32(np.nan)) for one in values
-    ]
+    return [np.where(known, sampled(one) / divisor, np.float32(np.nan)) for one in values]
 
 
 def rated(values: _Floats, threshold: float, width: float) -> _Floats:
     """Return the rating of values: -1 (roof) to +1 (tree), 0 at the threshold, the ends a width away from it."""
     ratings: _Floats = np.clip((values - np.float32(threshold)) / np.float32(width), -1, 1)
     return ratings
-
-
-def _on_grid(values: NDArray[np.generic], grid: Grid) -> _Floats:
-    return values.astype(np.float32).reshape(grid.shape)
 
 
 def _box(values: _Floats) -> _Floats:
@@ -245,7 +299,8 @@ def _moments(
     """
     sums = np.zeros((10, shape[0] * shape[1]))
     for position in range(len(chosen)):
-        i, cell = chosen[position], index[position]
+        # Unsigned, so that indices are not tested for counting from the end.
+        i, cell = np.uintp(chosen[position]), np.uintp(index[position])
         dx, dy, dz = x[i] - origin[0], y[i] - origin[1], z[i] - origin[2]
         sums[0, cell] += 1
         sums[1, cell] += dx

@@ -26,11 +26,15 @@ from ...scenes.geodata.outlines import simplify
 __all__ = ["regularise"]
 
 _Points = NDArray[np.float64]
+#: A wall that is worked on by itself: four numbers as in the arrays, without the overhead of small arrays.
+_Wall = tuple[float, float, float, float]
+_Place = tuple[float, float]
 
 #: Largest angle between walls of one direction (degrees), least share of the length for a main direction, their number.
 _SAME_DIRECTION, _MAIN_SHARE, _MOST_DIRECTIONS = 5.0, 0.15, 4
-#: Angle of neighbouring walls below which they are parallel, and below which their lines meet too far away (radians).
-_PARALLEL, _GRAZING = math.radians(2), math.radians(10)
+#: Angle of neighbouring walls below which they are parallel (radians), and sine of the one below which their lines meet
+#: too far away.
+_PARALLEL, _GRAZING = math.radians(2), math.sin(math.radians(10))
 
 
 def regularise(
@@ -97,7 +101,7 @@ def _regular(traced: Any, simple: Any, tolerance: float, angle: float, reach: fl
             turned = _turned_by_neighbours(walls, together, tolerance, angle, reach)
         else:
             turned = _turned(walls, mains, tolerance, angle)
-        merged = _merged(turned, tolerance)
+        merged = _merged([(x, y, along, length) for x, y, along, length in turned.tolist()], tolerance)
         outlines.append(_corners(_merged(_without_jogs(merged, tolerance), tolerance), tolerance))
     if len(outlines[0]) < 3:
         return None
@@ -144,9 +148,11 @@ def _fit_walls(corners: _Points, sources: list[_Points]) -> _Points | None:
         ring = ring[::-1]
         position = len(ring) - 1 - position
     # Start at a corner, so that the steps of each wall are contiguous.
-    ring = np.roll(ring, -position[0], axis=0)
-    start = (position - position[0]) % len(ring)
-    step = np.roll(ring, -1, axis=0) - ring
+    first = int(position[0])
+    ring = np.concatenate([ring[first:], ring[: first + 1]])
+    step = ring[1:] - ring[:-1]
+    ring = ring[:-1]
+    start = (position - first) % len(ring)
     length = np.hypot(step[:, 0], step[:, 1])
     middle = ring + step / 2
     total = np.maximum(np.add.reduceat(length, start), 1e-12)
@@ -206,9 +212,9 @@ def _turned(walls: _Points, mains: _Points, tolerance: float, angle: float) -> _
     return turned
 
 
-def _merged(walls: _Points | list[_Points], tolerance: float) -> list[_Points]:
+def _merged(walls: list[_Wall], tolerance: float) -> list[_Wall]:
     """Return the walls with parallel neighbours less than the tolerance apart merged."""
-    merged: list[_Points] = []
+    merged: list[_Wall] = []
     for wall in walls:
         merged.append(wall)
         while len(merged) > 1 and _continues(merged[-2], merged[-1], tolerance):
@@ -219,19 +225,20 @@ def _merged(walls: _Points | list[_Points], tolerance: float) -> list[_Points]:
     return merged
 
 
-def _continues(one: _Points, two: _Points, tolerance: float) -> bool:
+def _continues(one: _Wall, two: _Wall, tolerance: float) -> bool:
     turn = (two[2] - one[2] + math.pi) % (2 * math.pi) - math.pi
-    apart = abs(math.cos(one[2]) * (two[1] - one[1]) - math.sin(one[2]) * (two[0] - one[0]))
-    return bool(abs(turn) < _PARALLEL and apart < tolerance)
+    if abs(turn) >= _PARALLEL:
+        return False
+    return abs(math.cos(one[2]) * (two[1] - one[1]) - math.sin(one[2]) * (two[0] - one[0])) < tolerance
 
 
-def _joined(one: _Points, two: _Points) -> _Points:
+def _joined(one: _Wall, two: _Wall) -> _Wall:
     length = one[3] + two[3]
-    centre = (one[:2] * one[3] + two[:2] * two[3]) / max(length, 1e-12)
-    return np.array([*centre, (one if one[3] >= two[3] else two)[2], length])
+    x, y = ((one[axis] * one[3] + two[axis] * two[3]) / max(length, 1e-12) for axis in (0, 1))
+    return x, y, (one if one[3] >= two[3] else two)[2], length
 
 
-def _without_jogs(walls: list[_Points], tolerance: float) -> list[_Points]:
+def _without_jogs(walls: list[_Wall], tolerance: float) -> list[_Wall]:
     """Return the walls without short ones that cut a corner or shift a wall by less than the tolerance."""
     kept = list(walls)
     position = 0
@@ -244,42 +251,42 @@ def _without_jogs(walls: list[_Points], tolerance: float) -> list[_Points]:
     return kept
 
 
-def _close_up(before: _Points, after: _Points, wall: _Points, tolerance: float) -> bool:
+def _close_up(before: _Wall, after: _Wall, wall: _Wall, tolerance: float) -> bool:
     """Return whether the neighbours of a wall continue each other, or meet near it."""
     meeting = _meeting(before, after)
     if meeting is None:
         return _continues(before, after, tolerance)
-    aside, along = meeting - wall[:2], _along(wall)
-    across = abs(along[0] * aside[1] - along[1] * aside[0])
-    return bool(across < 2.5 * tolerance and abs(along @ aside) < wall[3] / 2 + tolerance)
+    right, up = meeting[0] - wall[0], meeting[1] - wall[1]
+    cos, sin = math.cos(wall[2]), math.sin(wall[2])
+    return abs(cos * up - sin * right) < 2.5 * tolerance and abs(cos * right + sin * up) < wall[3] / 2 + tolerance
 
 
-def _meeting(one: _Points, two: _Points) -> _Points | None:
+def _meeting(one: _Wall, two: _Wall) -> _Place | None:
     """Return where the lines of two walls meet; None when they are nearly parallel."""
-    along, onward = _along(one), _along(two)
-    cross = along[0] * onward[1] - along[1] * onward[0]
-    if abs(cross) < math.sin(_GRAZING):
+    cos, sin, onward_cos, onward_sin = math.cos(one[2]), math.sin(one[2]), math.cos(two[2]), math.sin(two[2])
+    cross = cos * onward_sin - sin * onward_cos
+    if abs(cross) < _GRAZING:
         return None
-    gap = two[:2] - one[:2]
-    meeting: _Points = one[:2] + along * (gap[0] * onward[1] - gap[1] * onward[0]) / cross
-    return meeting
+    gap = (two[0] - one[0]) * onward_sin - (two[1] - one[1]) * onward_cos
+    return one[0] + cos * gap / cross, one[1] + sin * gap / cross
 
 
-def _along(wall: _Points) -> _Points:
-    return np.array([math.cos(wall[2]), math.sin(wall[2])])
-
-
-def _corners(walls: list[_Points], tolerance: float) -> _Points:
+def _corners(walls: list[_Wall], tolerance: float) -> _Points:
     """Return the corners of a ring, shape (n, 2): where neighbouring walls meet, or the two ends of a step."""
-    corners: list[_Points] = []
+    corners: list[_Place] = []
     for wall, following in zip(walls, [*walls[1:], *walls[:1]], strict=True):
-        along, onward = _along(wall), _along(following)
-        between = (wall[:2] + along * wall[3] / 2 + following[:2] - onward * following[3] / 2) / 2
+        cos, sin, onward_cos, onward_sin = (
+            math.cos(wall[2]), math.sin(wall[2]), math.cos(following[2]), math.sin(following[2])
+        )  # fmt: skip
+        x = (wall[0] + cos * wall[3] / 2 + following[0] - onward_cos * following[3] / 2) / 2
+        y = (wall[1] + sin * wall[3] / 2 + following[1] - onward_sin * following[3] / 2) / 2
         meeting = _meeting(wall, following)
-        if meeting is not None and math.hypot(*(meeting - between)) < 4 * tolerance:
+        if meeting is not None and math.hypot(meeting[0] - x, meeting[1] - y) < 4 * tolerance:
             corners.append(meeting)
         else:
             # Walls that are parallel, or meet far away, are joined by a step.
-            corners.append(wall[:2] + along * ((between - wall[:2]) @ along))
-            corners.append(following[:2] + onward * ((between - following[:2]) @ onward))
+            along = (x - wall[0]) * cos + (y - wall[1]) * sin
+            onward = (x - following[0]) * onward_cos + (y - following[1]) * onward_sin
+            corners.append((wall[0] + cos * along, wall[1] + sin * along))
+            corners.append((following[0] + onward_cos * onward, following[1] + onward_sin * onward))
     return np.array(corners)

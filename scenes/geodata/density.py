@@ -99,10 +99,11 @@ def is_lattice(x: _Coordinates, y: _Coordinates) -> bool:
         return False
     middle = len(x) // 2
     near = (np.abs(x - x[middle]) < _TESTED) & (np.abs(y - y[middle]) < _TESTED)
-    places = np.unique(np.stack([x[near], y[near]], axis=1), axis=0)
-    nodes = len(np.unique(places[:, 0])) * len(np.unique(places[:, 1]))
-    single = int(np.count_nonzero(near)) == len(places)
-    return single and len(places) >= max(_FEWEST_NODES, nodes / _NODES_PER_POINT)
+    x, y = x[near], y[near]
+    nodes = len(np.unique(x)) * len(np.unique(y))
+    if len(x) < max(_FEWEST_NODES, nodes / _NODES_PER_POINT):
+        return False
+    return len(np.unique(np.stack([x, y], axis=1), axis=0)) == len(x)
 
 
 @kernel

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -118,29 +118,16 @@ class Grid:
 
     def cells(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Return the flat cell index of each point and whether it lies on the grid (index 0 where it does not)."""
+        # numba takes a while to load, and evaluating footprints needs no cells.
+        from .sampling import cells_at
+
         x, y = _of_one_shape(x, y)
-        flat, inside = np.empty(x.shape, dtype=np.intp), np.empty(x.shape, dtype=bool)
-        # In parts, so that many points do not need several arrays of their size at once.
-        for start in range(0, len(x) if x.ndim else 0, _CHUNK):
-            part = slice(start, start + _CHUNK)
-            flat[part], inside[part] = self._cells(x[part], y[part])
-        return (flat, inside) if x.ndim else self._cells(x, y)
-
-    def _cells(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        row, column = self._whole_pixels(x, y)
-        inside = (row >= 0) & (row < self.rows) & (column >= 0) & (column < self.columns)
-        flat = np.where(inside, row * self.columns + column, 0)
-        return flat.astype(np.intp), inside
-
-    def _whole_pixels(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Any, Any]:
-        """Return row and column of points as whole numbers.
-
-        They are counted from the origin of the CRS, and only the shift of the cells against it, to a micrometre, is
-        that of the grid: a point on the border of two cells is in the same one on the grid of every window.
-        """
+        # Cells are counted from the origin of the CRS, and only the shift of the grid against it, to a micrometre, is
+        # that of the grid: a point on the border of two cells is in the same one on the grid of every window.
         first, last = math.floor(self.west / self.gsd + 1e-6), math.ceil(self.north / self.gsd - 1e-6)
-        east, south = round(self.west - first * self.gsd, 6), round(last * self.gsd - self.north, 6)
-        return last - np.ceil((y + south) / self.gsd), np.floor((x - east) / self.gsd) - first
+        shift = round(self.west - first * self.gsd, 6), round(last * self.gsd - self.north, 6)
+        flat, inside = cells_at(x.ravel(), y.ravel(), (first, last), shift, self.gsd, (self.rows, self.columns))
+        return flat.reshape(x.shape), inside.reshape(x.shape)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Bilinear sampling of a raster at many points: one pass, without arrays of the points' size in between."""
+"""Many points on a grid: their cells, and a raster sampled at them, in one pass without arrays in between."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 
-__all__ = ["bilinear", "bilinear_at"]
+__all__ = ["bilinear", "bilinear_at", "cells_at"]
 
 
 @kernel(inline="always")
@@ -50,3 +50,38 @@ def bilinear(
         known = math.isfinite(x[i]) and math.isfinite(y[i])
         result[i] = bilinear_at(values, west, north, cell, x[i], y[i]) if known else np.nan
     return result
+
+
+@kernel
+def cells_at(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    first: tuple[int, int],
+    shift: tuple[float, float],
+    cell: float,
+    shape: tuple[int, int],
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return the flat index of the cell of each point and whether it is on the grid (index 0 where it is not).
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (n,)
+        Metres.
+    first : tuple of int
+        Column of the west border and row of the north border, counted from the origin of the CRS.
+    shift : tuple of float
+        Metres by which these borders are east and south of the multiples of the cell.
+    cell : float
+        Metres.
+    shape : tuple of int
+        Rows and columns.
+    """
+    flat, inside = np.zeros(len(x), dtype=np.intp), np.zeros(len(x), dtype=np.bool_)
+    for i in range(len(x)):
+        # np.divide does not test for division by zero: a cell is never 0.
+        row = first[1] - np.ceil(np.divide(y[i] + shift[1], cell))
+        column = np.floor(np.divide(x[i] - shift[0], cell)) - first[0]
+        # Coordinates that are not finite fail a comparison.
+        if row >= 0 and row < shape[0] and column >= 0 and column < shape[1]:
+            flat[i], inside[i] = int(row) * shape[1] + int(column), True
+    return flat, inside

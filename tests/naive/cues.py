@@ -20,3 +20,21 @@ def roughness(x, y, z, grid, width):
     holds = np.zeros(grid.shape, dtype=bool)
     holds[row, column] = True
     return np.where(holds & np.isfinite(least), least, np.nan)
+
+
+def tally(index, inside, heights, returns, threshold, size):
+    """Return per cell the points, the high points, those of several returns and the sum of their heights."""
+    tallies = np.zeros((4, size))
+    for cell, is_inside, height, number in zip(index, inside, heights, returns, strict=True):
+        if is_inside and np.isfinite(height):
+            tallies[0, cell] += 1
+            if height > threshold:
+                tallies[1:, cell] += 1, number > 1, height
+    return tallies
+
+
+def green_pixels(image, leaves, darkest):
+    """Return greenness and whether a pixel is bright enough, from whole bands."""
+    more, less = image.band(leaves), image.band("red")
+    usable = np.maximum(more, less) >= np.float32(darkest)
+    return np.where(usable, (more - less) / np.maximum(more + less, np.float32(1e-6)), 0), usable

@@ -1,5 +1,7 @@
 """Slow obvious oracle of bilinear sampling, one point at a time."""
 
+import math
+
 import numpy as np
 
 
@@ -17,3 +19,18 @@ def bilinear(elevation, xs, ys):
                 total += weight_r * weight_c * values[min(r + dr, grid.rows - 1), min(c + dc, grid.columns - 1)]
         result.append(total)
     return np.array(result)
+
+
+def cells(grid, x, y):
+    """Return the flat cell index of each point, one by one; 0 and False where it is on no cell."""
+    first, last = math.floor(grid.west / grid.gsd + 1e-6), math.ceil(grid.north / grid.gsd - 1e-6)
+    east, south = round(grid.west - first * grid.gsd, 6), round(last * grid.gsd - grid.north, 6)
+    found = []
+    for at_x, at_y in zip(x, y, strict=True):
+        if not (math.isfinite(at_x) and math.isfinite(at_y)):
+            found.append((0, False))
+            continue
+        row, column = last - math.ceil((at_y + south) / grid.gsd), math.floor((at_x - east) / grid.gsd) - first
+        inside = 0 <= row < grid.rows and 0 <= column < grid.columns
+        found.append((row * grid.columns + column, True) if inside else (0, False))
+    return found

@@ -1,13 +1,15 @@
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 import shapely
 from shapely.affinity import rotate, translate
 
 from roofbench.core.errors import MissingInputError
-from roofbench.detectors.ndsm.ndsm_detector import NDSM
+from roofbench.detectors.ndsm.ndsm_detector import NDSM, _means_inside
 from roofbench.detectors.registry import make_detector
+from roofbench.scenes.geodata.outlines import coverage_of_mask, trace
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid, Image
 from roofbench.scenes.scene import Scene
@@ -251,3 +253,17 @@ def test_a_scene_without_points_has_steps_too():
     none = np.empty(0)
     steps = list(NDSM().steps(Scene("empty", EXTENT, points=PointCloud(none, none, none)), RNG))
     assert len(steps[-1].panels[0].layers[-1].polygons) == 0
+
+
+def test_means_inside_traced_polygons_equal_those_of_the_cells_whose_centres_they_contain():
+    rng = np.random.default_rng(8)
+    grid = Grid(10.0, 50.0, 0.5, 60, 70)
+    mask = cv2.GaussianBlur(rng.normal(size=grid.shape), (0, 0), 1.0) > 0.02
+    values = rng.normal(size=grid.shape).astype(np.float32)
+    values[rng.random(grid.shape) < 0.3] = np.nan
+    polygons = trace(coverage_of_mask(mask), grid)
+    assert (shapely.get_num_interior_rings(polygons) > 0).any()
+    row, column = np.indices(grid.shape) + 0.5
+    x, y = grid.to_world(row, column)
+    expected = [np.nanmean(values[shapely.contains_xy(polygon, x, y)]) for polygon in polygons]
+    np.testing.assert_allclose(_means_inside(polygons, mask, grid, values)[0], expected, rtol=1e-6)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from naive import cues as naive_cues
 
+from roofbench.detectors.shared import cues as module
 from roofbench.detectors.shared.cues import cell_cues, chromaticity, greenness
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Grid, Image
@@ -114,8 +115,6 @@ def test_chromaticity_is_that_of_the_tiles_in_sun_and_shade():
 
 @pytest.mark.parametrize("window", [2.0, 3.0])
 def test_working_in_strips_changes_nothing(monkeypatch, window):
-    import roofbench.detectors.shared.cues as module
-
     x, y, z = cloud(seed=4)
     points, heights = PointCloud(x, y * 4 - 2730, z), z.astype(np.float32)
     grid = Grid(500.0, 910.0, 1.0, 32, 10)
@@ -124,3 +123,30 @@ def test_working_in_strips_changes_nothing(monkeypatch, window):
     np.testing.assert_allclose(
         cell_cues(points, heights, grid, threshold=2.5, window=window).roughness, whole, rtol=1e-5
     )
+
+
+def test_tallies_equal_those_of_one_point_at_a_time():
+    rng = np.random.default_rng(5)
+    n, size = 300, 6
+    index, inside = rng.integers(0, size, n), rng.random(n) < 0.9
+    heights = rng.uniform(-1, 6, n).astype(np.float32)
+    heights[:5] = np.nan, np.inf, -np.inf, 2.5, 1.0
+    returns = rng.integers(1, 4, n).astype(np.uint8)
+    *tallies, high, low, several = module._tally(index, inside, heights, returns, 2.5, (2, 3))
+    expected = naive_cues.tally(index, inside, heights, returns, 2.5, size)
+    np.testing.assert_allclose([tally.ravel() for tally in tallies], expected[[0, 1, 2, 3]], rtol=1e-12)
+    used = inside & np.isfinite(heights)
+    assert high.tolist() == np.flatnonzero(used & (heights > 2.5)).tolist()
+    assert low.tolist() == np.flatnonzero(used & (heights < 1)).tolist()
+    assert several
+    assert not module._tally(index, inside, heights, module._NO_RETURNS, 2.5, (2, 3))[-1]
+
+
+def test_greenness_of_pixels_equals_that_of_whole_bands():
+    values = np.random.default_rng(2).integers(0, 256, (4, 50, 40)).astype(np.uint8)
+    values[:, :2] = 0
+    image = Image(values, ("red", "green", "blue", "nir"), Grid(0.0, 0.0, 1.0, 50, 40))
+    index, usable = module._green_pixels(values[3], values[0], np.float32(255), np.float32(0.3))
+    expected, bright = naive_cues.green_pixels(image, "nir", 0.3)
+    assert np.array_equal(index, expected)
+    assert np.array_equal(usable, bright)

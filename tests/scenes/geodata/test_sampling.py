@@ -28,3 +28,17 @@ def test_a_plane_is_sampled_exactly_between_cell_centres():
 def test_points_that_are_not_finite_have_no_elevation():
     dem = Elevation(np.ones((2, 2), dtype=np.float32), Grid(0.0, 2.0, 1.0, 2, 2))
     assert np.isnan(dem.sample([np.nan, np.inf, 1.0], [1.0, 1.0, -np.inf])).all()
+
+
+@pytest.mark.parametrize("grid", [Grid(10.0, 30.0, 0.25, 40, 60), Grid(-3.1, 7.3, 0.35, 11, 13)])
+def test_cells_equal_those_of_one_point_at_a_time(grid):
+    rng = np.random.default_rng(1)
+    west, south, east, north = grid.extent
+    x, y = rng.uniform(west - 2, east + 2, 500), rng.uniform(south - 2, north + 2, 500)
+    # Corners and borders of cells, and places that are none.
+    x[:100], y[100:200] = west + grid.gsd * np.arange(-10, 90), north - grid.gsd * np.arange(-10, 90)
+    x[200:203], y[203:206] = [np.nan, np.inf, -np.inf], [np.nan, np.inf, -np.inf]
+    index, inside = grid.cells(x, y)
+    assert list(zip(index.tolist(), inside.tolist(), strict=True)) == naive_sampling.cells(grid, x, y)
+    assert grid.cells(x.reshape(50, 10), y.reshape(50, 10))[0].shape == (50, 10)
+    assert grid.cells(np.empty(0), np.empty(0))[0].shape == (0,)
