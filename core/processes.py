@@ -18,6 +18,7 @@ __all__ = [
     "clean_environment",
     "death_reason",
     "end_children",
+    "end_marked",
     "end_tree",
     "memory_reason",
     "start_python",
@@ -33,6 +34,7 @@ THREAD_LIMITS = {
     "NUMEXPR_NUM_THREADS": "1",
     "VECLIB_MAXIMUM_THREADS": "1",
 }
+_ROUNDS = 10  # of looking for marked processes: those that are found may just have started others
 _PATIENCE = 5.0  # seconds for killed processes to end
 #: Variables that say where and by which command line this process was started.
 _TRACES = ("PWD", "OLDPWD", "_", "PYTEST_CURRENT_TEST")
@@ -110,6 +112,21 @@ def end_children() -> None:
         while time.monotonic() < deadline:
             if os.waitpid(-1, getattr(os, "WNOHANG", 0))[0] == 0:
                 time.sleep(0.01)
+
+
+def end_marked(variable: str, value: str) -> None:
+    """Kill every process of this user with a value of an environment variable, whoever its parent is now."""
+    import psutil
+
+    for _ in range(_ROUNDS):
+        marked = []
+        for process in psutil.process_iter():
+            with suppress(psutil.Error, OSError):
+                if process.environ().get(variable) == value and process.status() != psutil.STATUS_ZOMBIE:
+                    marked.append(process)
+        if not marked:
+            break
+        _kill([*marked])
 
 
 def _kill(processes: list[object]) -> None:

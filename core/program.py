@@ -1,12 +1,14 @@
 """Programs: an executable of any language, run without a shell and watched until it ends.
 
 A program starts in a folder of its own with nothing on standard input. What it writes to standard output and standard
-error goes to a log. When it exceeds a limit, it is killed with all processes that it started.
+error goes to a log. When it ends or exceeds a limit, all processes that it started are killed: its descendants, its
+session, and processes in sessions of their own (daemons), which are known by a variable of their environment.
 """
 
 from __future__ import annotations
 
 import os
+import secrets
 import signal
 import subprocess
 import time
@@ -17,10 +19,12 @@ from pathlib import Path
 
 from .errors import ProgramError
 from .memory import bound_allocations, count_program_memory, tree_memory
-from .processes import Limits, clean_environment, end_tree, memory_reason, time_reason
+from .processes import Limits, clean_environment, end_marked, end_tree, memory_reason, time_reason
 
 __all__ = ["ProgramEnd", "log_tail", "run_program"]
 
+#: Variable that a program and all that it starts have in their environment, with a random value.
+_MARK = "ROOFBENCH_PROGRAM"
 _LONGEST_PAUSE = 0.05  # seconds between two checks
 _TAIL = 4000  # bytes of a log that are kept
 
@@ -74,14 +78,14 @@ def run_program(
     ProgramError
         It cannot be started, or it exceeded a limit and was killed.
     """
-    name = Path(command[0]).name
+    name, mark = Path(command[0]).name, secrets.token_hex(16)
     started = time.monotonic()
     with log.open("wb") as stream:
         try:
             process = subprocess.Popen(  # noqa: S603 - without a shell; running it is what the user asks for
                 list(command),
                 cwd=folder,
-                env=clean_environment(environment),
+                env=clean_environment({**(environment or {}), _MARK: mark}),
                 stdin=subprocess.DEVNULL,
                 stdout=stream,
                 stderr=subprocess.STDOUT,
@@ -106,6 +110,7 @@ def run_program(
         end_tree(process.pid)
         with suppress(OSError):
             os.killpg(process.pid, signal.SIGKILL)  # what it left behind in its session
+        end_marked(_MARK, mark)
         process.wait()
         count_program_memory(peak)
     if problem:

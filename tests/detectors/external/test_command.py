@@ -162,10 +162,12 @@ def test_a_memory_limit_stops_it(scene, tmp_path):
         rb.detect(scene, detector)
 
 
-def test_what_a_program_starts_ends_with_it(program, scene, square, tmp_path):
+@pytest.mark.skipif(sys.platform != "linux", reason="the command setsid is of Linux")
+@pytest.mark.parametrize("start", ["sleep 300 & echo $!", "(setsid sleep 300 & echo $!)"], ids=["child", "daemon"])
+def test_what_a_program_starts_ends_with_it(program, scene, square, tmp_path, start):
     import psutil
 
-    rb.detect(scene, program(f"sleep 300 & echo $! > {tmp_path}/child; cp {square} $3"))
+    rb.detect(scene, program(f"{start} > {tmp_path}/child; cp {square} $3"))
     child = int((tmp_path / "child").read_text())
     deadline = time.monotonic() + 10
     while psutil.pid_exists(child) and psutil.Process(child).status() != psutil.STATUS_ZOMBIE:
