@@ -14,12 +14,14 @@ rectangle does not describe that as well.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ...core.kernels import kernel
 from ...scenes.geodata.outlines import trace
 from ...scenes.geodata.raster import Grid
 from .rectangles import corners, to_world
@@ -69,49 +71,61 @@ def outline_buildings(
     if len(rectangles) == 0 or len(blocks) == 0:
         return outlines
     block = block_of(outlines, blocks)
-    tree = shapely.STRtree(outlines)
+    near = _near(outlines)
     result = outlines.copy()
     alone = np.bincount(block[block >= 0], minlength=len(blocks)) == 1
-    for k in np.flatnonzero(block >= 0):
-        of = block[k]
-        part = blocks[of]
-        if not alone[of]:
-            rivals = tree.query(outlines[k], predicate="dwithin", distance=2 * _REACH)
-            part = _part(rectangles[k], rectangles[rivals[rivals != k]], part, grid)
-        together = shapely.area(shapely.union(part, outlines[k]))
-        good = 2.0 if always else _AS_GOOD
-        if not part.is_empty and shapely.area(shapely.intersection(part, outlines[k])) < good * together:
-            result[k] = part
+    places = corners(rectangles)
+    inside = np.flatnonzero(block >= 0)
+    parts = blocks[block[inside]]
+    for row in np.flatnonzero(~alone[block[inside]]).tolist():
+        k = int(inside[row])
+        order = np.concatenate([[k], near[k][near[k] != k]])
+        parts[row] = _part(rectangles[order], places[k], parts[row], grid)
+    common = shapely.area(shapely.intersection(parts, outlines[inside]))
+    together = shapely.area(parts) + shapely.area(outlines[inside]) - common
+    follows = ~shapely.is_empty(parts) & (common < (2.0 if always else _AS_GOOD) * together)
+    result[inside[follows]] = parts[follows]
     # Zones are drawn one by one, regardless of the rectangles: where two footprints share a strip, the first keeps it.
-    drawn = result != outlines
-    for k in np.flatnonzero(drawn):
-        rivals = tree.query(outlines[k], predicate="dwithin", distance=2 * _REACH)
-        rivals = rivals[(rivals != k) & (~drawn[rivals] | (rivals < k))]
+    drawn = np.zeros(len(rectangles), dtype=np.bool_)
+    drawn[inside[follows]] = True
+    for k in np.flatnonzero(drawn).tolist():
+        rivals = near[k][(near[k] != k) & (~drawn[near[k]] | (near[k] < k))]
+        rivals = rivals[shapely.intersects(result[rivals], result[k])]
         rest = _whole(shapely.difference(result[k], shapely.union_all(result[rivals]), grid_size=_FINEST))
         result[k] = outlines[k] if rest.is_empty else rest
     return result
 
 
-def _part(rectangle: NDArray[np.float64], rivals: NDArray[np.float64], block: Any, grid: Grid) -> Any:
-    """Return the common area of a block and the zone of a rectangle, which ends at its neighbours, shape (m, 5)."""
-    place = corners(rectangle)[0]
+def _near(outlines: NDArray[np.object_]) -> list[NDArray[np.int64]]:
+    """Return the rows of the outlines whose zones may meet that of each, itself among them."""
+    one, other = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=2 * _REACH)
+    return np.split(other, np.searchsorted(one, np.arange(1, len(outlines))))
+
+
+def _part(rectangles: NDArray[np.float64], place: NDArray[np.float64], block: Any, grid: Grid) -> Any:
+    """Return the common area of a block and the zone of the first rectangle, which ends at the others, shape (m, 5).
+
+    `place` are the corners of the first.
+    """
     reach = _REACH / grid.gsd
-    left, top = np.floor(place.min(axis=0) - reach).astype(int) - 1
-    right, bottom = np.ceil(place.max(axis=0) + reach).astype(int) + 1
+    # Beyond its block a zone is not needed.
+    xmin, ymin, xmax, ymax = block.bounds
+    (first, last), (start, end) = grid.to_pixel([xmin, xmax], [ymax, ymin])
+    left, top = np.floor(np.maximum(place.min(axis=0) - reach, (start, first))).astype(int) - 1
+    right, bottom = np.ceil(np.minimum(place.max(axis=0) + reach, (end, last))).astype(int) + 1
     west, north = grid.to_world(top, left)
     window = Grid(float(west), float(north), grid.gsd, int(bottom - top), int(right - left))
-    x, y = np.meshgrid(np.arange(left, right) + 0.5, np.arange(top, bottom) + 0.5)
-    own = _nearness(rectangle, x, y)
-    lead = reach - own
-    for rival in rivals:
-        np.minimum(lead, _nearness(rival, x, y) - own, out=lead)
+    turns = np.stack([np.cos(rectangles[:, 4]), np.sin(rectangles[:, 4])], axis=1)
     # The "coverage" is more than one half where the lead is positive.
-    zone = shapely.union_all(trace((lead + 0.5).astype(np.float32), window))
+    pieces = trace(_lead(rectangles, turns, (int(top), int(left)), reach, window.shape), window)
+    zone = pieces[0] if len(pieces) == 1 else shapely.multipolygons(pieces)
     return shapely.simplify(_whole(shapely.intersection(zone, block)), _STRAIGHT)
 
 
 def _whole(outline: Any) -> Any:
     """Return an outline without its small parts; the largest is always kept."""
+    if shapely.get_type_id(outline) == shapely.GeometryType.POLYGON:
+        return outline
     parts = shapely.get_parts(outline)
     parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
     if len(parts) < 2:
@@ -120,10 +134,44 @@ def _whole(outline: Any) -> Any:
     return shapely.union_all(parts[(sizes >= _SCRAP) | (sizes == sizes.max())])
 
 
-def _nearness(rectangle: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    cos, sin = np.cos(rectangle[4]), np.sin(rectangle[4])
-    dx, dy = x - rectangle[0], y - rectangle[1]
-    u = np.abs(dx * cos + dy * sin) - 0.5 * rectangle[2]
-    v = np.abs(dy * cos - dx * sin) - 0.5 * rectangle[3]
-    nearness: NDArray[np.float64] = np.hypot(np.maximum(u, 0), np.maximum(v, 0)) + np.minimum(np.maximum(u, v), 0)
-    return nearness
+@kernel
+def _lead(
+    rectangles: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    first: tuple[int, int],
+    reach: float,
+    shape: tuple[int, int],
+) -> NDArray[np.float32]:
+    """Return one half more than how much nearer the first rectangle is than all others, at most its reach, in cells.
+
+    Parameters
+    ----------
+    rectangles : ndarray, shape (n, 5)
+    turns : ndarray, shape (n, 2)
+        Cosine and sine of their angles.
+    first : tuple of int
+        Row and column of the first cell.
+    reach : float
+    shape : tuple of int
+        Rows and columns.
+    """
+    rows, columns = shape
+    lead = np.empty((rows, columns), dtype=np.float32)
+    own, least = np.empty(columns), np.empty(columns)
+    for row in range(rows):
+        y = first[0] + row + 0.5
+        for k in range(len(rectangles)):
+            cos, sin, dy = turns[k, 0], turns[k, 1], y - rectangles[k, 1]
+            for column in range(columns):
+                dx = first[1] + column + 0.5 - rectangles[k, 0]
+                u = abs(dx * cos + dy * sin) - 0.5 * rectangles[k, 2]
+                v = abs(dy * cos - dx * sin) - 0.5 * rectangles[k, 3]
+                beyond_u, beyond_v = max(u, 0.0), max(v, 0.0)
+                nearness = math.sqrt(beyond_u * beyond_u + beyond_v * beyond_v) + min(max(u, v), 0.0)
+                if k == 0:
+                    own[column], least[column] = nearness, reach - nearness
+                else:
+                    least[column] = min(least[column], nearness - own[column])
+        for column in range(columns):
+            lead[row, column] = np.float32(least[column] + 0.5)
+    return lead

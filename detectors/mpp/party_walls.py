@@ -230,8 +230,9 @@ def _means(profile: Floats, reach: int) -> Floats:
 
 def _median(values: Floats) -> Floats:
     """Return the median of the known values of each station, 0 without any."""
-    some = np.isfinite(values).any(axis=1)
-    medians = np.zeros(len(values))
-    if some.any():
-        medians[some] = np.nanmedian(values[some], axis=1)
-    return medians
+    # Not np.nanmedian, whose masked arrays take longer than all the rest. Unknown values are sorted to the end.
+    ordered = np.sort(values, axis=1)
+    count = np.isfinite(ordered).sum(axis=1)
+    station = np.arange(len(values))
+    middle = 0.5 * (ordered[station, np.maximum(count - 1, 0) // 2] + ordered[station, count // 2])
+    return np.where(count > 0, middle, 0.0)

@@ -97,3 +97,11 @@ def restrained(score, high, reach):
         near = np.s_[max(r - reach, 0) : r + reach + 1, max(c - reach, 0) : c + reach + 1]
         result[r, c] = min(score[r, c], np.floor(score[near][high[near]].mean()))
     return result
+
+
+def nearness(rectangle, x, y):
+    """Return the distance of a place from a rectangle, inside the negative distance from the nearest side."""
+    dx, dy = x - rectangle[0], y - rectangle[1]
+    u = abs(dx * np.cos(rectangle[4]) + dy * np.sin(rectangle[4])) - rectangle[2] / 2
+    v = abs(dy * np.cos(rectangle[4]) - dx * np.sin(rectangle[4])) - rectangle[3] / 2
+    return np.hypot(u, v) if u > 0 and v > 0 else max(u, v)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import shapely
+from naive import mpp as naive_mpp
 
-from roofbench.detectors.mpp.buildings import outline_buildings
+from roofbench.detectors.mpp.buildings import _lead, outline_buildings
 from roofbench.scenes.geodata.raster import Grid
 
 GRID = Grid(1000.0, 2000.0, 0.5, 200, 200)
@@ -61,3 +62,23 @@ def test_rectangles_without_a_block_and_scenes_without_anything():
     assert outline_buildings(alone, np.empty(0, object), GRID)[0].equals(world((10, 20, 50, 40)))
     assert outline_buildings(alone, np.array([world((100, 100, 120, 120))]), GRID)[0].equals(world((10, 20, 50, 40)))
     assert len(outline_buildings(np.empty((0, 5)), np.array([world((0, 0, 9, 9))]), GRID)) == 0
+
+
+def test_the_lead_of_a_rectangle_equals_that_of_one_place_at_a_time():
+    rng = np.random.default_rng(4)
+    rectangles = np.column_stack([rng.uniform(-5, 25, (4, 2)), rng.uniform(4, 12, (4, 2)), rng.uniform(0, np.pi, 4)])
+    turns = np.stack([np.cos(rectangles[:, 4]), np.sin(rectangles[:, 4])], axis=1)
+    lead = _lead(rectangles, turns, (3, -6), 8.0, (14, 17))
+    for row in range(14):
+        for column in range(17):
+            near = [naive_mpp.nearness(one, column - 5.5, row + 3.5) for one in rectangles]
+            assert lead[row, column] == pytest.approx(0.5 + min(8.0, *near[1:]) - near[0], abs=1e-5)
+
+
+def test_a_zone_is_cut_off_beyond_its_block_without_a_trace():
+    # A narrow block, of which the nearer rectangle gets its part although the zone is much larger.
+    rectangles = np.array([[30.0, 30.0, 20.0, 20.0, 0.0], [60.0, 30.0, 20.0, 20.0, 0.0]])
+    block = world((20, 20, 70, 40), (40, 20, 44, 50))
+    first, second = outline_buildings(rectangles, np.array([block]), GRID, always=True)
+    assert first.union(second).symmetric_difference(block).area < 0.1
+    assert first.area == pytest.approx(world((20, 20, 45, 40), (40, 20, 44, 50)).area, abs=0.2)

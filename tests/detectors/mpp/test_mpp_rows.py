@@ -13,6 +13,7 @@ from roofbench.detectors.mpp.cells import HIGH, LOW
 from roofbench.detectors.mpp.party_walls import (
     CERTAIN,
     PROBABLE,
+    _median,
     colour_strength,
     most_walls,
     party_walls,
@@ -287,3 +288,11 @@ def test_wings_with_a_step_each_are_one_building():
 def test_empty_scenes_have_no_levels():
     found = find_levels(np.empty((0, 5)), np.empty(0, dtype=object), *place(), GRID)
     assert len(found.parts) == len(found.buildings) == 0
+
+
+@pytest.mark.parametrize("lines", [1, 4, 7])
+def test_medians_of_stations_are_those_of_their_known_values(lines):
+    values = np.random.default_rng(lines).normal(size=(60, lines))
+    values[np.random.default_rng(0).random(values.shape) < 0.5] = np.nan
+    known = [row[np.isfinite(row)] for row in values]
+    assert _median(values).tolist() == [np.median(row) if len(row) else 0.0 for row in known]
