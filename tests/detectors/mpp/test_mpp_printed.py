@@ -9,6 +9,7 @@ import pytest
 import shapely
 from naive import mpp as naive
 
+from roofbench import detect, make_scene
 from roofbench.core.errors import ParameterError
 from roofbench.detectors.mpp.printed_chain import Operation, PrintedSchedule, PrintedTrace, run_printed
 from roofbench.detectors.mpp.printed_detector import class_gaussians
@@ -337,3 +338,28 @@ def test_without_squares_one_chain_sees_all_as_printed():
 def test_squares_smaller_than_a_house_are_refused():
     with pytest.raises(ParameterError, match="at least 32 m"):
         make_detector("mpp-printed[square=8]")
+
+
+#: For each parameter a value other than its default.
+OTHER = {
+    "heights": "above-ground", "cell": 1.5, "ground_mean": 50.0, "ground_spread": 10.0, "tree_mean": 3.0,
+    "tree_spread": 0.5, "length_mean": 25.0, "length_spread": 2.0, "width_mean": 5.0, "width_spread": 1.0,
+    "nu_mean": 40.0, "nu_spread": 1.0, "tau_mean": 2.0, "tau_spread": 0.05, "buildings": 1e5, "birth_share": 0.9,
+    "match": 0.3, "update": "union", "least_height": 8.0, "prior_limit": 0.3, "overlap_share": 0.0,
+    "length_step": 5.0, "width_step": 5.0, "angle_step": 45.0, "nu_step": 3.0, "tau_step": 1.0, "least_side": 8.0,
+    "largest_side": 10.0, "false_alarm_ratio": 0.9, "iterations": 4000, "square": 32.0,
+}  # fmt: skip
+
+
+def test_every_parameter_changes_the_result():
+    street = make_scene("fairfield-small", seed=5)
+
+    def found(**changes):
+        detector = make_detector("mpp-printed", {"iterations": 3000, **changes})
+        return detect(street, detector, seed=0).polygons.tolist()
+
+    before = found()
+    assert before
+    assert set(OTHER) == set(make_detector("mpp-printed").values())
+    unchanged = [name for name, value in OTHER.items() if found(**{name: value}) == before]
+    assert not unchanged
