@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -144,7 +144,11 @@ class MPP(MPPParameters, Detector):
         fits = fit_roofs(prepared, rectangles)
         record: dict[str, Any] = {
             "cell": prepared.grid.gsd,
-            "background": {key: value for key, value in asdict(prepared.background).items() if key != "evidence"},
+            "background": {
+                field.name: getattr(prepared.background, field.name)
+                for field in fields(prepared.background)
+                if field.name != "evidence"
+            },
             "cues": list(prepared.cues.used),
             "notes": list(prepared.cues.notes),
             "boxes": len(prepared.boxes),

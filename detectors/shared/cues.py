@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,10 @@ _FLATTEST = 1e-3
 _BLOCK, _GROUND = 2.0, 1.0
 #: Cells of a strip.
 _STRIP = 1_000_000
+#: Least share of usable pixels in a cell.
+_LEAST_USABLE = np.float32(0.25)
+#: Stands for the mask of an image that has data everywhere.
+_ALL_VALID = np.empty((0, 0), dtype=np.bool_)
 #: Stands for the numbers of returns of a cloud without them.
 _NO_RETURNS = np.empty(0, dtype=np.uint8)
 #: Deviation where there is no plane: larger than any real one.
@@ -195,30 +199,85 @@ def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     more, less = (image.values[image.bands.index(name)] for name in (leaves, "red"))
     if not (more.any() or less.any()):
         return None
-    index, usable = _green_pixels(more, less, np.float32(np.iinfo(more.dtype).max), np.float32(darkest))
-    return _cell_means((index,), usable, image, grid)[0]
+    row, column, width = _places(image, grid)
+    valid = _ALL_VALID if image.valid is None else image.valid
+    pixels = _Pixels(more, less, valid, np.float32(np.iinfo(more.dtype).max), np.float32(darkest))
+    return np.asarray(_green_cells(pixels, row, column, width))
+
+
+class _Pixels(NamedTuple):
+    """Two bands of an image, whether a pixel has data (empty: all have), the value of white, the darkest brightness."""
+
+    more: NDArray[Any]
+    less: NDArray[Any]
+    valid: NDArray[np.bool_]
+    white: np.float32
+    darkest: np.float32
+
+
+def _places(image: Image, grid: Grid) -> tuple[_Floats, _Floats, int]:
+    """Return the rows and the columns of the image at the cell centres (0: centre of the first), and pixels per cell.
+
+    Averaging over about one cell before sampling at the cell centres avoids aliasing.
+    """
+    x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)
+    _, y = grid.to_world(np.arange(grid.rows) + 0.5, 0)
+    _, column = image.grid.to_pixel(x, image.grid.north)
+    row, _ = image.grid.to_pixel(image.grid.west, y)
+    width = max(1, round(grid.gsd / image.grid.gsd))
+    return (row - 0.5).astype(np.float32), (column - 0.5).astype(np.float32), width
 
 
 @kernel
-def _green_pixels(
-    more: NDArray[Any], less: NDArray[Any], white: np.float32, darkest: np.float32
-) -> tuple[_Floats, _Floats]:
-    """Return the index (more - less) / (more + less) of each pixel, and 1 where a band is bright enough, else 0.
+def _green_cells(pixels: _Pixels, rows: _Floats, columns: _Floats, width: int) -> _Floats:
+    """Return (more - less) / (more + less), averaged over the usable pixels of squares and interpolated, per cell.
 
-    Both are 0 in the dark. Each value is the same to the last bit as that of the arrays of `Image.band`.
+    The same means as `_cell_means`, but for rounding: pixels are turned into indices row by row, and no raster of the
+    size of the image is made. `rows`, `columns` and `width` are `_places`.
     """
-    rows, columns = more.shape
-    index, usable = np.empty((rows, columns), dtype=np.float32), np.empty((rows, columns), dtype=np.float32)
-    for row in range(rows):
-        for column in range(columns):
-            # np.divide: a loop with an error for division by zero is not vectorised.
-            high = np.divide(np.float32(more[row, column]), white)
-            low = np.divide(np.float32(less[row, column]), white)
-            bright = max(high, low) >= darkest
-            ratio = np.divide(high - low, max(high + low, np.float32(1e-6)))
-            index[row, column] = ratio if bright else np.float32(0)
-            usable[row, column] = np.float32(1) if bright else np.float32(0)
-    return index, usable
+    high, wide = pixels.more.shape
+    result = np.empty((len(rows), len(columns)), dtype=np.float32)
+    total, weight = np.empty(wide, dtype=np.float32), np.empty(wide, dtype=np.float32)
+    area = np.float32(width * width)
+    for i in range(len(rows)):
+        total[:], weight[:] = 0, 0
+        top = math.floor(rows[i]) - width // 2
+        for r in range(max(top, 0), min(top + width + 1, high)):
+            share = _share_of(rows[i], r - top, width, high)
+            for c in range(wide if share > 0 else 0):
+                # np.divide: a loop with an error for division by zero is not vectorised.
+                one = np.divide(np.float32(pixels.more[r, c]), pixels.white)
+                other = np.divide(np.float32(pixels.less[r, c]), pixels.white)
+                index = np.divide(one - other, max(one + other, np.float32(1e-6)))
+                usable = share if max(one, other) >= pixels.darkest else np.float32(0)
+                if len(pixels.valid) > 0:
+                    usable *= np.float32(pixels.valid[r, c])
+                total[c] += usable * index
+                weight[c] += usable
+        for j in range(len(columns)):
+            left, sums, weights = math.floor(columns[j]) - width // 2, np.float32(0), np.float32(0)
+            for c in range(max(left, 0), min(left + width + 1, wide)):
+                share = _share_of(columns[j], c - left, width, wide)
+                sums += share * total[c]
+                weights += share * weight[c]
+            known = weights > _LEAST_USABLE * area
+            result[i, j] = np.divide(sums, weights) if known else np.float32(np.nan)
+    return result
+
+
+@kernel(inline="always")
+def _share_of(place: np.float32, offset: int, width: int, count: int) -> np.float32:
+    """Return the share of a pixel, `offset` behind the start of the first of two squares, in their interpolation.
+
+    The squares are those around the pixels before and after a place; one whose centre is outside the image counts 0.
+    """
+    first, share = math.floor(place), np.float32(0)
+    beyond = place - np.float32(first)
+    if offset < width and 0 <= first < count:
+        share += np.float32(1) - beyond
+    if offset > 0 and 0 <= first + 1 < count:
+        share += beyond
+    return share
 
 
 def chromaticity(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
@@ -245,13 +304,8 @@ def _cell_means(values: tuple[_Floats, ...], usable: _Floats, image: Image, grid
     if image.valid is not None:
         usable = usable * image.valid
         values = tuple(one * image.valid for one in values)
-    # Averaging over about one cell before sampling at the cell centres avoids aliasing.
-    width = max(1, round(grid.gsd / image.grid.gsd))
-    x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)
-    _, y = grid.to_world(np.arange(grid.rows) + 0.5, 0)
-    _, column = image.grid.to_pixel(x, image.grid.north)
-    row, _ = image.grid.to_pixel(image.grid.west, y)
-    map_x, map_y = np.meshgrid((column - 0.5).astype(np.float32), (row - 0.5).astype(np.float32))
+    row, column, width = _places(image, grid)
+    map_x, map_y = np.meshgrid(column, row)
 
     def sampled(pixels: _Floats) -> _Floats:
         blurred = cv2.blur(pixels, (width, width), borderType=cv2.BORDER_CONSTANT)
@@ -261,7 +315,7 @@ def _cell_means(values: tuple[_Floats, ...], usable: _Floats, image: Image, grid
         return cells
 
     weight = sampled(usable)
-    known, divisor = weight > 0.25, np.maximum(weight, np.float32(0.25))
+    known, divisor = weight > _LEAST_USABLE, np.maximum(weight, _LEAST_USABLE)
     return [np.where(known, sampled(one) / divisor, np.float32(np.nan)) for one in values]
 
 

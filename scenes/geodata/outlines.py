@@ -55,7 +55,7 @@ def coverage_of_mask(mask: NDArray[np.bool_], share: NDArray[np.float32] | None 
 
 
 def trace(coverage: NDArray[np.float32], grid: Grid) -> NDArray[np.object_]:
-    """Return the polygons, with holes, where the coverage exceeds one half; array of shapely Polygons.
+    """Return the polygons, with holes, where the coverage, which is known everywhere, exceeds one half.
 
     Objects that reach the border of the grid end there.
     """
@@ -64,14 +64,25 @@ def trace(coverage: NDArray[np.float32], grid: Grid) -> NDArray[np.object_]:
     x, y = grid.to_world(np.arange(-1, grid.rows + 1) + 0.5, np.arange(-1, grid.columns + 1) + 0.5)
     # Rebind the name, so that an array that only the call held is released.
     coverage = np.pad(coverage, 1)
-    generator = contourpy.contour_generator(x, y, coverage, fill_type=contourpy.FillType.OuterOffset)
+    # Not contourpy.contour_generator, which takes longer to look for cells to leave out than to trace a small outline.
+    no_mask: Any = None
+    generator = contourpy.SerialContourGenerator(
+        *np.meshgrid(x, y),
+        coverage.astype(np.float64),
+        no_mask,
+        corner_mask=True,
+        line_type=contourpy.SerialContourGenerator.default_line_type,
+        fill_type=contourpy.FillType.OuterOffset,
+        quad_as_tri=False,
+        z_interp=contourpy.ZInterp.Linear,
+    )
     filled: Any = generator.filled(0.5, np.inf)
     rings, offsets = filled
     polygons = np.empty(len(rings), dtype=object)
     for number, (points, offset) in enumerate(zip(rings, offsets, strict=True)):
         places = np.round(points * _FRACTIONS) / _FRACTIONS
-        parts = [places[a:b] for a, b in itertools.pairwise(offset)]
-        polygons[number] = shapely.Polygon(parts[0], parts[1:])
+        parts = [shapely.linearrings(places[a:b]) for a, b in itertools.pairwise(offset.tolist())]
+        polygons[number] = shapely.polygons(parts[0], parts[1:] or None)
     invalid = ~shapely.is_valid(polygons)
     if invalid.any():
         polygons = shapely.get_parts(np.where(invalid, shapely.make_valid(polygons), polygons))

@@ -142,11 +142,17 @@ def test_tallies_equal_those_of_one_point_at_a_time():
     assert not module._tally(index, inside, heights, module._NO_RETURNS, 2.5, (2, 3))[-1]
 
 
-def test_greenness_of_pixels_equals_that_of_whole_bands():
-    values = np.random.default_rng(2).integers(0, 256, (4, 50, 40)).astype(np.uint8)
-    values[:, :2] = 0
-    image = Image(values, ("red", "green", "blue", "nir"), Grid(0.0, 0.0, 1.0, 50, 40))
-    index, usable = module._green_pixels(values[3], values[0], np.float32(255), np.float32(0.3))
-    expected, bright = naive_cues.green_pixels(image, "nir", 0.3)
-    assert np.array_equal(index, expected)
-    assert np.array_equal(usable, bright)
+@pytest.mark.parametrize("gsd", [0.3, 1.0, 1.7])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_greenness_of_cells_is_the_mean_of_the_pixels_of_whole_bands(gsd, dtype):
+    rng = np.random.default_rng(2)
+    # Some cells are beyond the image.
+    pixels = Grid(498.3, 909.2, gsd, round(9 / gsd), round(11 / gsd))
+    values = rng.integers(0, np.iinfo(dtype).max, (4, *pixels.shape)).astype(dtype)
+    values[:, :, :2] = 0
+    valid = rng.random(pixels.shape) < 0.8
+    for mask in (None, valid):
+        image = Image(values, ("red", "green", "blue", "nir"), pixels, mask)
+        index, usable = naive_cues.green_pixels(image, "nir", 0.3)
+        expected = module._cell_means((index,), usable, image, GRID)[0]
+        np.testing.assert_allclose(greenness(image, GRID, darkest=0.3), expected, atol=1e-5)
