@@ -4,6 +4,10 @@ The *rotation* of a line towards a reference is the smallest angle that makes bo
 (-45, 45] degrees. All rotations use the directions as fitted, so the result does not depend on the order.
 Sources: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.3.2 (references in the neighbourhood); Awrangjeb, Zhang &
 Fraser (2011), section 3.3 (the longest line of the same black shape).
+
+In the 2010 paper, the smallest rotation is to avoid wrong references. Where streets are curved, houses differ by a few
+degrees, so the smallest rotation is towards a neighbour, and the lines of one house get several directions
+(`adjust_within_shape` is the reading against it).
 """
 
 from __future__ import annotations
@@ -14,9 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from .boxes import OX, OY, UX, UY, Boxes, lengths
+from .boxes import OX, OY, U0, U1, UX, UY, Boxes, lengths
 
-__all__ = ["adjust_to_neighbours", "adjust_to_shape", "by_length", "rotate", "rotation_between"]
+__all__ = [
+    "adjust_to_neighbours",
+    "adjust_to_shape",
+    "adjust_within_shape",
+    "by_length",
+    "rotate",
+    "rotation_between",
+]
 
 
 @kernel
@@ -85,6 +96,54 @@ def adjust_to_neighbours(
     rotation: NDArray[np.float64] = _nearest_rotations(
         lines, by_length(lines), references, radius, tolerance, longer_only
     )
+    return rotation
+
+
+@kernel
+def _rotations_within(
+    lines: NDArray[np.float64],
+    shapes: NDArray[np.int64],
+    order: NDArray[np.int64],
+    radius: float,
+    tolerance: float,
+    reach: float,
+) -> NDArray[np.float64]:
+    angles = np.arctan2(lines[:, UY], lines[:, UX])
+    rotation = np.full(len(lines), np.nan)
+    for place in range(len(order)):
+        j = order[place]
+        half = (lines[j, U1] - lines[j, U0]) / 2
+        for i in order[:place]:
+            if shapes[i] != shapes[j] or math.hypot(lines[i, OX] - lines[j, OX], lines[i, OY] - lines[j, OY]) > radius:
+                continue
+            turn = rotation_between(angles[j], angles[i])
+            if abs(turn) <= tolerance and half * math.sin(abs(turn)) <= reach:
+                rotation[j] = turn
+                break
+    return rotation
+
+
+def adjust_within_shape(
+    lines: Boxes, shapes: NDArray[np.int64], *, radius: float, tolerance: float, reach: float
+) -> NDArray[np.float64]:
+    """Return the rotation of each line towards the longest line of its shape that is near it in place and direction.
+
+    Parameters
+    ----------
+    radius : float
+        Largest distance of the centres, pixels.
+    tolerance : float
+        Largest rotation, radians.
+    reach : float
+        Largest distance by which the rotation moves the ends of the line, pixels: a short line follows its shape by a
+        large angle, a long one, whose direction is certain, by a small one.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Radians; NaN for lines without such a longer line.
+    """
+    rotation: NDArray[np.float64] = _rotations_within(lines, shapes, by_length(lines), radius, tolerance, reach)
     return rotation
 
 

@@ -4,7 +4,8 @@ Two rectangles are *oblique* when they are neither parallel nor perpendicular. T
 building adjoin at right angles, so their overlap is natural; that of oblique rectangles is not. The *new share* of a
 rectangle is the share of its area outside all larger rectangles that are oblique to it. A *duplicate* has a new share
 near zero, adding little more than its corners, or it and a larger rectangle at any angle are mostly the same area
-(intersection over union). Parts of one building are never: they differ in size, or in place.
+(intersection over union), or what it adds to the larger ones at any angle is narrower than a part of a building
+(*new width*). Parts of one building are never: they differ in size, or in place.
 
 The 2010 paper (section 3.4) joins perpendicular parts, leaves open how natural and other overlaps are separated, and
 drops an initial rectangle that lies completely inside a final one. A rectangle from a short jagged line crosses the
@@ -13,6 +14,7 @@ sides of the earlier rectangle and is never completely inside it.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +28,8 @@ __all__ = ["DuplicateRules", "find_duplicates"]
 
 #: Lattice points along each side of a rectangle.
 _LATTICE = 32
+#: Lattice points across a new width, and the most along a side of a rectangle.
+_FINE, _MOST = 7.5, 256
 
 
 class DuplicateRules(NamedTuple):
@@ -39,11 +43,14 @@ class DuplicateRules(NamedTuple):
         Largest angle between rectangles that count as parallel or perpendicular, radians.
     same : float
         Largest intersection over union of a rectangle and a larger one that are two; 1 or more: not tested.
+    width : float
+        Least width of what a rectangle adds to all larger ones, pixels; 0: not tested.
     """
 
     least: float
     tolerance: float
     same: float = 1.0
+    width: float = 0.0
 
 
 @kernel
@@ -66,6 +73,39 @@ def new_share(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
 
 
 @kernel
+def adds_width(box: NDArray[np.float64], others: NDArray[np.float64], width: float) -> bool:
+    """Return whether a square parallel to a box, `width` wide, fits into the part of the box outside all others.
+
+    The part is sampled on a lattice in the coordinates of the box, so that widths are known to an eighth. A box that is
+    narrower than `width` needs its own width only.
+    """
+    length, depth = box[U1] - box[U0], box[V1] - box[V0]
+    rows = min(_MOST, math.ceil(_FINE * length / width))
+    columns = min(_MOST, math.ceil(_FINE * depth / width))
+    # A strip that is n - 1/2 steps wide contains n or n - 1 rows of the lattice, equally often.
+    down, across = round(width * rows / length + 0.5), round(width * columns / depth + 0.5)
+    down, across = min(rows, down), min(columns, across)
+    run = np.zeros(columns, dtype=np.int64)
+    for i in range(rows):
+        along = box[U0] + (i + 0.5) * length / rows
+        beside = 0
+        for j in range(columns):
+            side = box[V0] + (j + 0.5) * depth / columns
+            x = box[OX] + along * box[UX] - side * box[UY]
+            y = box[OY] + along * box[UY] + side * box[UX]
+            run[j] += 1
+            for k in range(len(others)):
+                u, v = to_box(x, y, others[k])
+                if others[k, U0] <= u <= others[k, U1] and others[k, V0] <= v <= others[k, V1]:
+                    run[j] = 0
+                    break
+            beside = beside + 1 if run[j] >= down else 0
+            if beside >= across:
+                return True
+    return False
+
+
+@kernel
 def _find(
     boxes: NDArray[np.float64],
     order: NDArray[np.int64],
@@ -75,11 +115,11 @@ def _find(
     rules: DuplicateRules,
 ) -> NDArray[np.bool_]:
     duplicates = np.zeros(len(boxes), dtype=np.bool_)
-    oblique = np.empty_like(boxes)
+    oblique, overlapping = np.empty_like(boxes), np.empty_like(boxes)
     for place in range(len(order)):
         i = order[place]
         area = (boxes[i, U1] - boxes[i, U0]) * (boxes[i, V1] - boxes[i, V0])
-        found = 0
+        found, near = 0, 0
         for j in order[:place]:
             dx, dy, reach = centres[i, 0] - centres[j, 0], centres[i, 1] - centres[j, 1], radius[i] + radius[j]
             if duplicates[j] or dx * dx + dy * dy >= reach * reach:
@@ -90,12 +130,17 @@ def _find(
                 if common > rules.same * (area + larger - common):
                     duplicates[i] = True
                     break
+            for k in range(8):
+                overlapping[near, k] = boxes[j, k]
+            near += 1
             if abs(rotation_between(directions[i], directions[j])) > rules.tolerance:
                 for k in range(8):
                     oblique[found, k] = boxes[j, k]
                 found += 1
         if not duplicates[i]:
             duplicates[i] = found > 0 and new_share(boxes[i], oblique[:found]) < rules.least
+        if not duplicates[i] and near > 0 and rules.width > 0:
+            duplicates[i] = not adds_width(boxes[i], overlapping[:near], rules.width)
     return duplicates
 
 

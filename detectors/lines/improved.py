@@ -231,7 +231,7 @@ class Improved(LineDetector):
             tree_edges |= is_green & (mean_in_boxes(rasters.cover.entropy, farther) > rasters.entropy_limit)
         return tree_edges, green
 
-    def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
+    def _rotation(self, segments: Segments, rasters: Rasters) -> NDArray[np.float64]:
         tolerance = np.radians(self.adjustment_angle)
         if self.adjustment in ("bases", "longest"):
             return adjust_to_shape(
@@ -239,7 +239,7 @@ class Improved(LineDetector):
             )
         if self.adjustment == "neighbours":
             return adjust_to_neighbours(
-                segments.lines, radius=self.adjustment_radius / gsd, tolerance=tolerance, longer_only=False
+                segments.lines, radius=self.adjustment_radius / rasters.gsd, tolerance=tolerance, longer_only=False
             )
         return np.zeros(len(segments))
 

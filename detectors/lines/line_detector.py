@@ -70,7 +70,7 @@ class LineDetector(LineParameters):
 
         rotation = np.full(len(segments), np.nan)
         remaining = np.flatnonzero(outcomes == Outcome.RECTANGLE)
-        rotation[remaining] = self._rotation(segments.take(remaining), rasters.gsd)
+        rotation[remaining] = self._rotation(segments.take(remaining), rasters)
         outcomes[remaining[np.isnan(rotation[remaining])]] = Outcome.UNADJUSTED
         remaining = np.flatnonzero(outcomes == Outcome.RECTANGLE)
         lines = segments.lines.copy()
@@ -91,7 +91,12 @@ class LineDetector(LineParameters):
         duplicates = np.zeros(len(candidates), dtype=np.bool_)
         duplicates[buildings] = find_duplicates(
             candidates[buildings],
-            DuplicateRules(self.new_share, float(np.radians(self.parallel_angle)), self.same_overlap),
+            DuplicateRules(
+                self.new_share,
+                float(np.radians(self.parallel_angle)),
+                self.same_overlap,
+                self.new_width / rasters.gsd if self.new_share > 0 else 0.0,
+            ),
         )
         return Trace(
             image=rasters.image,
@@ -116,7 +121,7 @@ class LineDetector(LineParameters):
         """Return which lines are tree edges, and which are green, whatever their texture."""
 
     @abstractmethod
-    def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
+    def _rotation(self, segments: Segments, rasters: Rasters) -> NDArray[np.float64]:
         """Return the angle that adjusts each line, radians, NaN for lines that are dropped."""
 
     def _image_edges(self, rasters: Rasters) -> ImageEdges | None:

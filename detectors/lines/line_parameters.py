@@ -15,10 +15,20 @@ from ...core.errors import ParameterError
 from ...core.parameters import parameter
 from ..base import Detector
 
-__all__ = ["PAPER_PIXEL", "LineParameters"]
+__all__ = ["PAPER_PIXEL", "LineParameters", "least_new_width"]
 
 #: Ground sampling distance that the 2010 paper's pixel counts refer to, metres.
 PAPER_PIXEL = 0.15
+
+
+def least_new_width(default: float) -> Any:
+    """Return the parameter `new_width`, whose default differs between the detectors."""
+    return parameter(
+        default, unit="m", minimum=0, swept=(0.0, 1.0, 2.0, 3.0),
+        doc="least width of what a final rectangle adds to all larger ones; with less it is a duplicate; 0 tests none, "
+        "as printed",
+        source="2010, 3.3.1: a building is at least 3 m wide; reading",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +46,7 @@ class LineParameters(Detector):
         "ground_tile": {"ground": ("tile-dem", "tile-mode")},
         "tile_pixel": {"ground": ("tile-dem", "tile-mode")},
         "neighbourhood": {"marking": ("nearest", "squares")},
+        "new_width": {"new_share": (ABOVE_ZERO,)},
         "parallel_angle": {"new_share": (ABOVE_ZERO,)},
     }
 
@@ -279,6 +290,7 @@ class LineParameters(Detector):
         "duplicate; 0 keeps all, as printed",
         source="2010, 3.4: parts adjoin at right angles; reading",
     )  # fmt: skip
+    new_width: float = least_new_width(0.0)
     same_overlap: float = parameter(
         0.5, minimum=0, maximum=1, swept=(0.4, 0.5, 0.6, 0.8, 1.0),
         doc="largest intersection over union of two final rectangles at any angle; with more the smaller one is a "

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from ...core.conditions import Uses
 from ...core.parameters import parameter
-from .adjustment import adjust_to_neighbours
+from .adjustment import adjust_to_neighbours, adjust_within_shape
 from .boxes import Boxes
 from .extension import band, mean_in_boxes
 from .line_detector import LineDetector
 from .line_modes import PAPER, PROGRAM
+from .line_parameters import least_new_width
 from .rasters import Rasters
 from .segments import Segments
 
@@ -46,15 +47,16 @@ class Original(LineDetector):
 
     used_with: ClassVar[Mapping[str, Uses]] = {
         **LineDetector.used_with,
-        "adjustment_angle": {"adjustment_reference": ("longer", "any")},
-        "adjustment_radius": {"adjustment_reference": ("longer", "any")},
-        "adjustment_share": {"adjustment_reference": ("longer", "any")},
+        "adjustment_angle": {"adjustment_reference": ("shape", "longer", "any")},
+        "adjustment_radius": {"adjustment_reference": ("shape", "longer", "any")},
+        "adjustment_share": {"adjustment_reference": ("shape", "longer", "any")},
     }
 
     adjustment_reference: str = parameter(
-        "longer", choices=("longer", "any", "none"),
-        doc="reference lines of the adjustment: longer ones (the print sorts by length), all nearby ones, or none: "
-        "lines stay as fitted",
+        "shape", choices=("shape", "longer", "any", "none"),
+        doc="reference lines of the adjustment: the longest line of the same black shape if that moves the ends by at "
+        "most a point spacing, otherwise longer lines nearby; longer lines nearby (the print sorts by length); all "
+        "lines nearby; or none: lines stay as fitted",
         source="2010, 3.3.2; reading; program",
     )  # fmt: skip
     adjustment_share: float = parameter(
@@ -62,19 +64,26 @@ class Original(LineDetector):
         doc="share of the lines, the longest first, that can be references; optional in the print, 1 is all",
         source="2010, 3.3.2",
     )  # fmt: skip
+    new_width: float = least_new_width(2.25)
 
     def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         beside = mean_in_boxes(rasters.cover.vegetation, band(lines, self.band_width / rasters.gsd, 0.0))
         green = beside > self._index_limit(rasters.image)
         return green, green
 
-    def _rotation(self, segments: Segments, gsd: float) -> NDArray[np.float64]:
+    def _rotation(self, segments: Segments, rasters: Rasters) -> NDArray[np.float64]:
         if self.adjustment_reference == "none":
             return np.zeros(len(segments))
-        return adjust_to_neighbours(
+        radius, tolerance = self.adjustment_radius / rasters.gsd, float(np.radians(self.adjustment_angle))
+        nearby = adjust_to_neighbours(
             segments.lines,
-            radius=self.adjustment_radius / gsd,
-            tolerance=np.radians(self.adjustment_angle),
-            longer_only=self.adjustment_reference == "longer",
+            radius=radius,
+            tolerance=tolerance,
+            longer_only=self.adjustment_reference != "any",
             share=self.adjustment_share,
         )
+        if self.adjustment_reference != "shape":
+            return nearby
+        reach = rasters.spacing / rasters.gsd
+        own = adjust_within_shape(segments.lines, segments.shapes, radius=radius, tolerance=tolerance, reach=reach)
+        return np.where(np.isnan(own), nearby, own)

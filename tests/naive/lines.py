@@ -126,3 +126,20 @@ def duplicates(boxes: np.ndarray, least: float, tolerance: float) -> np.ndarray:
         if new_share(boxes[i], boxes[turned]) >= least:
             stays.append(i)
     return np.isin(range(len(boxes)), stays, invert=True)
+
+
+def widest_new_square(box: np.ndarray, others: np.ndarray, widths: np.ndarray, steps: int = 40) -> float:
+    """Widest of some squares parallel to a box that fits into the box outside others, by trying many places."""
+    union = shapely.union_all(shapely.polygons(box_corners(others)))
+    widest = 0.0
+    for width in widths:
+        half = width / 2
+        along = np.linspace(box[U0] + half, box[U1] - half, steps) if width <= box[U1] - box[U0] else []
+        across = np.linspace(box[V0] + half, box[V1] - half, steps) if width <= box[V1] - box[V0] else []
+        squares = np.array([[*box[:4], u - half, u + half, v - half, v + half] for u in along for v in across])
+        if (
+            len(squares)
+            and (shapely.area(shapely.intersection(shapely.polygons(box_corners(squares)), union)) < 1e-9).any()
+        ):
+            widest = width
+    return widest

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from naive import lines as naive_lines
 
-from roofbench.detectors.lines.adjustment import adjust_to_neighbours, adjust_to_shape, rotate
+from roofbench.detectors.lines.adjustment import adjust_to_neighbours, adjust_to_shape, adjust_within_shape, rotate
 from roofbench.detectors.lines.boxes import U0, U1, UX, UY, V0, V1, prefix_sums
 from roofbench.detectors.lines.colours import Colours, dominant_bins, dominant_ranges, yiq_bins
-from roofbench.detectors.lines.duplicates import DuplicateRules, find_duplicates, new_share
+from roofbench.detectors.lines.duplicates import DuplicateRules, adds_width, find_duplicates, new_share
 from roofbench.detectors.lines.extension import Cover, Growth, extend_lines, extend_rectangle
 from roofbench.detectors.lines.final_rectangles import (
     FinalRules,
@@ -79,6 +79,16 @@ def test_lines_beyond_the_reach_of_the_longest_are_turned_to_the_next_longest():
         adjust_to_shape(lines[[0, 1, 3]], np.zeros(3, np.int64), tolerance=np.pi / 8, longest_only=False)
     )
     np.testing.assert_allclose(rotation, [0, np.nan, 3], atol=1e-9)
+
+
+def test_a_line_follows_its_own_house_unless_that_moves_its_ends_too_far():
+    house, short, long = line(0, 0, 0, 100), line(30, 0, 97, 12), line(40, 0, 7, 60)
+    neighbour, far = line(60, 0, 10, 90), line(400, 0, 1, 90)
+    lines, shapes = np.array([house, short, long, neighbour, far]), np.array([1, 1, 1, 2, 1])
+    found = adjust_within_shape(lines, shapes, radius=100.0, tolerance=np.pi / 8, reach=2.0)
+    np.testing.assert_allclose(np.degrees(found), [np.nan, -7, np.nan, np.nan, np.nan], atol=1e-9)
+    found = adjust_within_shape(lines, shapes, radius=1e3, tolerance=np.pi / 8, reach=4.0)
+    np.testing.assert_allclose(np.degrees(found), [np.nan, -7, -7, np.nan, -1], atol=1e-9)
 
 
 def test_rotating_turns_a_line_about_its_centre():
@@ -209,6 +219,26 @@ def test_of_two_rectangles_of_one_area_the_smaller_is_a_duplicate_at_any_angle()
     boxes = np.array([house, again, turned, wing])
     assert find_duplicates(boxes, DuplicateRules(0.0, np.radians(3), 0.5)).tolist() == [False, True, True, False]
     assert not find_duplicates(boxes, DuplicateRules(0.0, np.radians(3))).any()
+
+
+def test_the_new_width_of_a_rectangle_is_that_of_the_widest_square_outside_the_others():
+    rng = np.random.default_rng(6)
+    for _ in range(12):
+        boxes = rectangles(rng, 4)
+        widest = naive_lines.widest_new_square(boxes[0], boxes[1:], np.arange(2.0, 60.0, 2.0))
+        narrow = min(boxes[0, U1] - boxes[0, U0], boxes[0, V1] - boxes[0, V0])
+        assert not adds_width(boxes[0], boxes[1:], 1.2 * widest + 4) or 1.2 * widest + 4 > narrow
+        assert widest == 0 or adds_width(boxes[0], boxes[1:], 0.85 * widest)
+    assert not adds_width(boxes[0], boxes[:1], 1.0)
+
+
+@pytest.mark.parametrize(("angle", "beyond", "expected"), [(90, 2.5, False), (90, 1.5, True), (97, 1.5, True)])
+def test_a_rectangle_that_adds_a_narrow_strip_is_a_duplicate_at_any_angle(angle, beyond, expected):
+    house, part = line(0, 0, 0, 18), line(4, beyond / 2, angle, 12 + beyond)
+    house[V0], house[V1], part[V1] = -6, 6, 8
+    boxes = np.array([house, part])
+    assert find_duplicates(boxes, DuplicateRules(0.01, np.radians(3), 1.0, 2.0)).tolist() == [False, expected]
+    assert not find_duplicates(boxes, DuplicateRules(0.01, np.radians(3))).any()
 
 
 @pytest.mark.parametrize(
