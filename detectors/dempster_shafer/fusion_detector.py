@@ -34,8 +34,8 @@ from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..shared.cue_information import ANCHOR, CueInformation, informative_cues
-from ..shared.cues import greenness
 from ..shared.morphology import opened, without_holes
+from ..shared.pixel_cues import greenness
 from ..shared.regularise import regularise
 from ..steps import Step
 from .cue_maps import CueMaps, cue_maps

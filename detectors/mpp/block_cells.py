@@ -63,8 +63,9 @@ def built_cells(rectangles: Rectangles, gsd: float, height: NDArray[np.uint16], 
     sure = inside & (state != LOW)
     core = (high & (around > 0)) | sure
     gaps = high & closed(core, 0.5 * _NARROW / gsd) & ~core
-    apart = _whole(core, sure, gsd)
-    gaps &= ~_crowns(gaps, apart, np.where(core & high, height, np.uint16(0)), height, gsd)
+    rising = gaps & (height > _roofs_around(core & high, height, gsd).astype(np.int32) + _CROWN_RISE)
+    if rising.any():
+        gaps &= ~_crowns(rising, gaps, _whole(core, sure, gsd))
     built = _whole(core | gaps, sure, gsd)
     built = _with_rims(built, height, high, max(round(_RIM / gsd), 1))
     count, labels, statistics, _ = cv2.connectedComponentsWithStats(built.astype(np.uint8), connectivity=4)
@@ -86,11 +87,13 @@ def _components(mask: Mask) -> Labels:
     return labels
 
 
-def _crowns(gaps: Mask, apart: Mask, roofs: NDArray[np.uint16], height: NDArray[np.uint16], gsd: float) -> Mask:
-    """Return the cells of gaps between two blocks of a mask that rise above the roofs (0: none) on both sides."""
-    rising = gaps & (height > closed_heights(roofs, 0.5 * _NARROW / gsd).astype(np.int32) + _CROWN_RISE)
-    if not rising.any():
-        return rising
+def _roofs_around(roof: Mask, height: NDArray[np.uint16], gsd: float) -> NDArray[np.uint16]:
+    """Return the height of the roofs on both sides of a narrow gap; 0 elsewhere."""
+    return closed_heights(np.where(roof, height, np.uint16(0)), 0.5 * _NARROW / gsd)
+
+
+def _crowns(rising: Mask, gaps: Mask, apart: Mask) -> Mask:
+    """Return the cells of gaps between two blocks of a mask that rise above the roofs on both sides."""
     row, column = np.nonzero(gaps)
     blocks, gap = _components(apart), _components(gaps)[1:-1, 1:-1]
     own = gap[row, column]

@@ -6,7 +6,7 @@ read only where the cloud does not give them (rasters, single-return scanners, i
 Nouns
 -----
 rating
-    -1 (not green) to +1 (green) of each cell; NaN without colours and in the dark. See `shared.cues`.
+    -1 (not green) to +1 (green) of each cell; NaN without colours and in the dark. See `shared.pixel_cues`.
 tally
     Number of high cells with evidence for a roof and the sum of their ratings, and the same of those with evidence
     against one; whole numbers, so that the parts of a city add up.
@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from ...scenes.geodata.raster import Grid, Image
 from ..shared.cue_information import silence_of
-from ..shared.cues import DARKEST, LEAST_GREEN_RED, LEAST_NDVI, greenness, rated
+from ..shared.cues import rated
+from ..shared.pixel_cues import DARKEST, LEAST_GREEN_RED, LEAST_NDVI, greenness
 from .arrays import Integers, Scores, States
 from .cells import HIGH
 from .tables import MILLI

@@ -25,11 +25,15 @@ __all__ = ["corners", "inside_any", "overlap_area", "row_span", "to_grid_frame",
 
 def corners(rectangles: Rectangles) -> Floats:
     """Return the corners in the grid frame, shape (n, 4, 2), of rectangles, shape (n, 5)."""
-    r = np.asarray(rectangles, dtype=np.float64).reshape(-1, 5)
-    along = np.stack([np.cos(r[:, 4]), np.sin(r[:, 4])], axis=-1) * r[:, 2:3] / 2
-    across = np.stack([-np.sin(r[:, 4]), np.cos(r[:, 4])], axis=-1) * r[:, 3:4] / 2
-    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    return np.stack([r[:, :2] + i * along + j * across for i, j in signs], axis=1)
+    x, y, a, b, angle = np.asarray(rectangles, dtype=np.float64).reshape(-1, 5).T
+    cos, sin = np.cos(angle), np.sin(angle)
+    along, across = (cos * a / 2, sin * a / 2), (-sin * b / 2, cos * b / 2)
+    place = np.empty((len(x), 4, 2))
+    for axis, centre in enumerate((x, y)):
+        low, high = centre - along[axis], centre + along[axis]
+        place[:, 0, axis], place[:, 1, axis] = low - across[axis], high - across[axis]
+        place[:, 2, axis], place[:, 3, axis] = high + across[axis], low + across[axis]
+    return place
 
 
 def to_world(rectangles: Rectangles, grid: Grid) -> Floats:

@@ -49,10 +49,15 @@ def absorb_strips(
     kept = np.ones(len(result), dtype=np.bool_)
     areas = result[:, 2:4].prod(axis=1)
     # The tree contains buildings as they were; none has grown by more than this.
-    tree, grown = shapely.STRtree(shapely.polygons(corners(result))), 0.0
+    outlines = shapely.polygons(corners(result))
+    tree, grown = shapely.STRtree(outlines), 0.0
+    one, other = tree.query(outlines, predicate="dwithin", distance=_APART)
+    beside = np.split(other, np.searchsorted(one, np.arange(1, len(result))))
     for strip in np.argsort(areas, kind="stable"):
         short, long = sorted(result[strip, 2:4])
-        near = tree.query(shapely.polygons(corners(result[strip]))[0], predicate="dwithin", distance=_APART + grown)
+        near = beside[strip]
+        if grown > 0:
+            near = tree.query(shapely.polygons(corners(result[strip]))[0], predicate="dwithin", distance=_APART + grown)
         near = near[kept[near] & (areas[near] > areas[strip])]
         larger = near[(long > slender * short) | (areas[strip] < part_share * areas[near])]
         if len(larger) == 0:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scenes.geodata.raster import Grid, Image
-from ..shared.cues import DARKEST, chromaticity
+from ..shared.pixel_cues import DARKEST, chromaticity
 from .arrays import Floats
 
 __all__ = ["Colours", "colours_at", "colours_of"]

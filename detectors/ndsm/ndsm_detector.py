@@ -32,8 +32,9 @@ from ...scenes.ground.heights import Heights, heights_of
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..shared.cue_information import ANCHOR, IMAGE, PENETRATION, CueInformation, informative_cues, silent_on_rasters
-from ..shared.cues import DARKEST, LEAST_GREEN_RED, LEAST_NDVI, CellCues, cell_cues, greenness, rated
+from ..shared.cues import CellCues, cell_cues, rated
 from ..shared.morphology import opened, without_holes
+from ..shared.pixel_cues import DARKEST, LEAST_GREEN_RED, LEAST_NDVI, greenness
 from ..shared.regularise import regularise
 from ..steps import Step
 from .ndsm_steps import ndsm_steps

@@ -1,4 +1,4 @@
-"""Cues that separate roofs from trees, per cell of a grid.
+"""Cues of laser points that separate roofs from trees, per cell of a grid; those of an image are `pixel_cues`.
 
 Nouns
 -----
@@ -12,10 +12,8 @@ multiple share
 roughness
     Standard deviation, metres, of the high points of a window about their plane; each cell has the smallest value of
     the windows that contain it, so that ridges, eaves and steps between roofs are smooth.
-greenness
-    (NIR - R) / (NIR + R), or (G - R) / (G + R) without near infrared; NaN in the dark, where colours are noise.
-chromaticity
-    Shares of red and of blue in the sum of red, green and blue; NaN in the dark.
+rating
+    What a cue says of a cell: -1 (roof) to +1 (tree).
 
 Axis order (row, column), row 0 northernmost. Cells without a value are NaN.
 """
@@ -24,21 +22,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from ...scenes.geodata.points import PointCloud
-from ...scenes.geodata.raster import Grid, Image
+from ...scenes.geodata.raster import Grid
 
-__all__ = ["DARKEST", "LEAST_GREEN_RED", "LEAST_NDVI", "CellCues", "cell_cues", "chromaticity", "greenness", "rated"]
+__all__ = ["CellCues", "cell_cues", "rated"]
 
 _Floats = NDArray[np.float32]
-
-#: Greenness of vegetation with and without near infrared, and brightness (0..1) below which colours are noise.
-LEAST_NDVI, LEAST_GREEN_RED, DARKEST = 0.15, 0.05, 0.1
 
 #: Least number of points in the 3 x 3 cells around a cell without points from which its high share is taken.
 _NEIGHBOURS = 3
@@ -50,10 +44,6 @@ _FLATTEST = 1e-3
 _BLOCK, _GROUND = 2.0, 1.0
 #: Cells of a strip.
 _STRIP = 1_000_000
-#: Least share of usable pixels in a cell.
-_LEAST_USABLE = np.float32(0.25)
-#: Stands for the mask of an image that has data everywhere.
-_ALL_VALID = np.empty((0, 0), dtype=np.bool_)
 #: Stands for the numbers of returns of a cloud without them.
 _NO_RETURNS = np.empty(0, dtype=np.uint8)
 #: Deviation where there is no plane: larger than any real one.
@@ -181,142 +171,6 @@ def _noise(points: PointCloud, heights: NDArray[np.float32], low: NDArray[np.int
     n, mean = count[several], np.bincount(index, weights=h, minlength=size)[several] / count[several]
     squares = np.bincount(index, weights=h * h, minlength=size)[several] / n
     return float(np.median(np.sqrt(np.maximum(squares - mean**2, 0) * n / (n - 1))))
-
-
-def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
-    """Return the mean vegetation index of the image per cell of a grid; None when the image has no colours for it.
-
-    Parameters
-    ----------
-    image : Image
-    grid : Grid
-    darkest : float
-        Pixels whose brightest band is below this (0..1) are ignored.
-    """
-    leaves = next((name for name in ("nir", "green") if {name, "red"} <= set(image.bands)), None)
-    if leaves is None:
-        return None
-    more, less = (image.values[image.bands.index(name)] for name in (leaves, "red"))
-    if not (more.any() or less.any()):
-        return None
-    row, column, width = _places(image, grid)
-    valid = _ALL_VALID if image.valid is None else image.valid
-    pixels = _Pixels(more, less, valid, np.float32(np.iinfo(more.dtype).max), np.float32(darkest))
-    return np.asarray(_green_cells(pixels, row, column, width))
-
-
-class _Pixels(NamedTuple):
-    """Two bands of an image, whether a pixel has data (empty: all have), the value of white, the darkest brightness."""
-
-    more: NDArray[Any]
-    less: NDArray[Any]
-    valid: NDArray[np.bool_]
-    white: np.float32
-    darkest: np.float32
-
-
-def _places(image: Image, grid: Grid) -> tuple[_Floats, _Floats, int]:
-    """Return the rows and the columns of the image at the cell centres (0: centre of the first), and pixels per cell.
-
-    Averaging over about one cell before sampling at the cell centres avoids aliasing.
-    """
-    x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)
-    _, y = grid.to_world(np.arange(grid.rows) + 0.5, 0)
-    _, column = image.grid.to_pixel(x, image.grid.north)
-    row, _ = image.grid.to_pixel(image.grid.west, y)
-    width = max(1, round(grid.gsd / image.grid.gsd))
-    return (row - 0.5).astype(np.float32), (column - 0.5).astype(np.float32), width
-
-
-@kernel
-def _green_cells(pixels: _Pixels, rows: _Floats, columns: _Floats, width: int) -> _Floats:
-    """Return (more - less) / (more + less), averaged over the usable pixels of squares and interpolated, per cell.
-
-    The same means as `_cell_means`, but for rounding: pixels are turned into indices row by row, and no raster of the
-    size of the image is made. `rows`, `columns` and `width` are `_places`.
-    """
-    high, wide = pixels.more.shape
-    result = np.empty((len(rows), len(columns)), dtype=np.float32)
-    total, weight = np.empty(wide, dtype=np.float32), np.empty(wide, dtype=np.float32)
-    area = np.float32(width * width)
-    for i in range(len(rows)):
-        total[:], weight[:] = 0, 0
-        top = math.floor(rows[i]) - width // 2
-        for r in range(max(top, 0), min(top + width + 1, high)):
-            share = _share_of(rows[i], r - top, width, high)
-            for c in range(wide if share > 0 else 0):
-                # np.divide: a loop with an error for division by zero is not vectorised.
-                one = np.divide(np.float32(pixels.more[r, c]), pixels.white)
-                other = np.divide(np.float32(pixels.less[r, c]), pixels.white)
-                index = np.divide(one - other, max(one + other, np.float32(1e-6)))
-                usable = share if max(one, other) >= pixels.darkest else np.float32(0)
-                if len(pixels.valid) > 0:
-                    usable *= np.float32(pixels.valid[r, c])
-                total[c] += usable * index
-                weight[c] += usable
-        for j in range(len(columns)):
-            left, sums, weights = math.floor(columns[j]) - width // 2, np.float32(0), np.float32(0)
-            for c in range(max(left, 0), min(left + width + 1, wide)):
-                share = _share_of(columns[j], c - left, width, wide)
-                sums += share * total[c]
-                weights += share * weight[c]
-            known = weights > _LEAST_USABLE * area
-            result[i, j] = np.divide(sums, weights) if known else np.float32(np.nan)
-    return result
-
-
-@kernel(inline="always")
-def _share_of(place: np.float32, offset: int, width: int, count: int) -> np.float32:
-    """Return the share of a pixel, `offset` behind the start of the first of two squares, in their interpolation.
-
-    The squares are those around the pixels before and after a place; one whose centre is outside the image counts 0.
-    """
-    first, share = math.floor(place), np.float32(0)
-    beyond = place - np.float32(first)
-    if offset < width and 0 <= first < count:
-        share += np.float32(1) - beyond
-    if offset > 0 and 0 <= first + 1 < count:
-        share += beyond
-    return share
-
-
-def chromaticity(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
-    """Return the shares of red and of blue in the colour of each cell of a grid, shape (2, rows, columns).
-
-    Shares do not depend on how brightly a slope is lit. None when the image has no colours; `darkest`: see `greenness`.
-    """
-    if not image.is_colour:
-        return None
-    red, green, blue = (image.band(name) for name in ("red", "green", "blue"))
-    total = np.maximum(red + green + blue, np.float32(1e-6))
-    bright = np.maximum(np.maximum(red, green), blue)
-    usable = (bright >= darkest).astype(np.float32)
-    return np.stack(_cell_means((usable * (red / total), usable * (blue / total)), usable, image, grid))
-
-
-def _cell_means(values: tuple[_Floats, ...], usable: _Floats, image: Image, grid: Grid) -> list[_Floats]:
-    """Return the means of the usable pixels (1, else 0) per cell; NaN where more than three quarters have none.
-
-    Values are 0 where a pixel is not usable.
-    """
-    import cv2
-
-    if image.valid is not None:
-        usable = usable * image.valid
-        values = tuple(one * image.valid for one in values)
-    row, column, width = _places(image, grid)
-    map_x, map_y = np.meshgrid(column, row)
-
-    def sampled(pixels: _Floats) -> _Floats:
-        blurred = cv2.blur(pixels, (width, width), borderType=cv2.BORDER_CONSTANT)
-        cells: _Floats = cv2.remap(
-            blurred, map_x, map_y, interpolation=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
-        )
-        return cells
-
-    weight = sampled(usable)
-    known, divisor = weight > _LEAST_USABLE, np.maximum(weight, _LEAST_USABLE)
-    return [np.where(known, sampled(one) / divisor, np.float32(np.nan)) for one in values]
 
 
 def rated(values: _Floats, threshold: float, width: float) -> _Floats:

@@ -67,23 +67,24 @@ def regularise(
         are so near, so that what a wall becomes does not depend on a far end that a window of a scene may not show.
     """
     simple = simplify(polygons, tolerance)
-    result = simple.copy()
+    regular = np.empty(len(polygons), dtype=object)
     for number, (traced, plain) in enumerate(zip(polygons, simple, strict=True)):
-        regular = _regular(traced, plain, tolerance, math.radians(angle), reach)
-        if regular is None or not regular.is_valid:
-            continue
-        common = regular.intersection(traced).area
-        if common >= least_agreement * (regular.area + traced.area - common):
-            result[number] = regular
-    return result
+        regular[number] = _regular(traced, plain, tolerance, math.radians(angle), reach)
+    # None is not valid.
+    valid = np.flatnonzero(shapely.is_valid(regular))
+    common = shapely.area(shapely.intersection(regular[valid], polygons[valid]))
+    together = shapely.area(regular[valid]) + shapely.area(polygons[valid]) - common
+    agreeing = valid[common >= least_agreement * together]
+    simple[agreeing] = regular[agreeing]
+    return simple
 
 
 def _regular(traced: Any, simple: Any, tolerance: float, angle: float, reach: float) -> Any | None:
     """Return one regularised polygon, or None when its exterior ring has fewer than three corners."""
-    origin = np.array(traced.bounds[:2])
-    sources = [shapely.get_coordinates(ring)[:-1] - origin for ring in (traced.exterior, *traced.interiors)]
-    is_long = max(traced.bounds[2] - traced.bounds[0], traced.bounds[3] - traced.bounds[1]) > 2 * reach
-    corners = [shapely.get_coordinates(ring)[:-1] - origin for ring in (simple.exterior, *simple.interiors)]
+    bounds = shapely.bounds(traced)
+    origin = bounds[:2]
+    sources, corners = ([ring - origin for ring in _rings(polygon)] for polygon in (traced, simple))
+    is_long = max(bounds[2] - bounds[0], bounds[3] - bounds[1]) > 2 * reach
     if is_long:
         corners = [_corners_by_squares(ring, origin, tolerance, reach) for ring in sources]
         corners = [ring for number, ring in enumerate(corners) if number == 0 or len(ring) >= 3]
@@ -105,7 +106,15 @@ def _regular(traced: Any, simple: Any, tolerance: float, angle: float, reach: fl
         outlines.append(_corners(_merged(_without_jogs(merged, tolerance), tolerance), tolerance))
     if len(outlines[0]) < 3:
         return None
-    return shapely.Polygon(outlines[0] + origin, [hole + origin for hole in outlines[1:] if len(hole) >= 3])
+    shell, *holes = [shapely.linearrings(ring + origin) for ring in outlines if len(ring) >= 3]
+    return shapely.polygons(shell, holes or None)
+
+
+def _rings(polygon: Any) -> list[_Points]:
+    """Return the places of each ring, the exterior one first, each place once."""
+    places, ring = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
+    ends = np.flatnonzero(np.diff(ring, append=-1)) + 1
+    return [places[first : end - 1] for first, end in itertools.pairwise([0, *ends.tolist()])]
 
 
 def _corners_by_squares(ring: _Points, origin: _Points, tolerance: float, side: float) -> _Points:

@@ -31,11 +31,3 @@ def tally(index, inside, heights, returns, threshold, size):
             if height > threshold:
                 tallies[1:, cell] += 1, number > 1, height
     return tallies
-
-
-def green_pixels(image, leaves, darkest):
-    """Return greenness, 0 where a pixel is too dark or has no data, and 1 where it is not, from whole bands."""
-    more, less = image.band(leaves), image.band("red")
-    usable = np.maximum(more, less) >= np.float32(darkest)
-    usable = (usable if image.valid is None else usable & image.valid).astype(np.float32)
-    return usable * (more - less) / np.maximum(more + less, np.float32(1e-6)), usable
