@@ -64,7 +64,7 @@ class Original(LineDetector):
         doc="share of the lines, the longest first, that can be references; optional in the print, 1 is all",
         source="2010, 3.3.2",
     )  # fmt: skip
-    new_width: float = least_new_width(2.25)
+    new_width: float = least_new_width(2.0)
 
     def _tree_edges(self, rasters: Rasters, lines: Boxes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         beside = mean_in_boxes(rasters.cover.vegetation, band(lines, self.band_width / rasters.gsd, 0.0))
