@@ -12,10 +12,11 @@ group
     group in parallel: their jobs see what the groups before left.
 
 Two rounds: a greedy search of the squares, group by group, and a local search of squares shifted by half a side, group
-by group, which lets buildings on the borders move and merge. The sampler adds a round between the two: a chain in each
-square, between what the first round left in its neighbours. It alone draws random numbers, and it starts from a result
-that depends on few metres around. So what is found at a place depends on little more than the squares around it: a
-window of a scene gives what the scene gives.
+by group, which lets buildings on the borders move and merge. It is made twice, with and without the rectangles at the
+borders of the first round, and the state of lower energy is kept. The sampler adds a round between the two: a chain in
+each square, between what the first round left in its neighbours. It alone draws random numbers, and it starts from a
+result that depends on few metres around. So what is found at a place depends on little more than the squares around
+it: a window of a scene gives what the scene gives.
 """
 
 from __future__ import annotations
@@ -30,9 +31,13 @@ from numpy.typing import NDArray
 from ...scenes.geodata.raster import Grid
 from ..tiling import tiles_over
 from .arrays import Floats, Rectangles
+from .rectangles import corners
 from .threads import ONE_THREAD, Threads
 
-__all__ = ["Rounds", "Square", "process_squares", "rounds_of", "side_of"]
+__all__ = ["Rounds", "Square", "at_borders", "process_squares", "rounds_of", "side_of"]
+
+#: Cells between a rectangle and a border that it touches, at most.
+_TOUCH = 1.5
 
 _Extent = tuple[float, float, float, float]
 
@@ -126,6 +131,24 @@ def _squares(grid: Grid, extent: _Extent, side: float, shift: float) -> list[Squ
             min((north - y0) / grid.gsd, float(grid.rows)),
         ]
         found.append(Square(tile.column, tile.row, np.array(edges)))
+    return found
+
+
+def at_borders(rectangles: Rectangles, squares: Sequence[Square]) -> NDArray[np.bool_]:
+    """Return which rectangles cross or touch a border between squares that cover a grid, shape (n,).
+
+    >>> halves = [Square(0, 0, np.array([0.0, 0, 10, 8])), Square(1, 0, np.array([10.0, 0, 20, 8]))]
+    >>> at_borders(np.array([[9.0, 4, 4, 2, 0], [6, 4, 4, 2, 0], [19, 4, 4, 2, 0]]), halves).tolist()
+    [True, False, False]
+    """
+    place = corners(rectangles)
+    low, high = place.min(axis=1) - _TOUCH, place.max(axis=1) + _TOUCH
+    edges = np.array([square.edges for square in squares]).reshape(-1, 2, 2)
+    found = np.zeros(len(rectangles), dtype=np.bool_)
+    for axis in range(2):
+        # The first and the last are the edges of the grid.
+        borders = np.unique(edges[..., axis])[1:-1]
+        found |= np.searchsorted(borders, low[:, axis]) < np.searchsorted(borders, high[:, axis])
     return found
 
 

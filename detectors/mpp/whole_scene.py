@@ -13,11 +13,11 @@ from .parameters import MPPParameters
 from .preparation import Prepared
 from .random_stream import stream
 from .rectangles import corners
-from .squares import Square, process_squares, rounds_of
+from .squares import Square, at_borders, process_squares, rounds_of
 from .strips import absorb_strips
 from .threads import Threads
 from .walls import close_walls
-from .windows import Window
+from .windows import Window, window_energy
 
 __all__ = ["find_rectangles", "total_energy"]
 
@@ -56,7 +56,14 @@ def find_rectangles(
 
     def joined(square: Square, own: Rectangles, fixed: Rectangles) -> Rectangles:
         window, sweeps = Window(tables, model, square.edges, fixed), min(parameters.sweeps, _SEAM_SWEEPS)
-        return search(window, own, boxes_of(square), capacity=len(own) + _SEAM_ROOM, sweeps=sweeps)
+        boxes, capacity = boxes_of(square), len(own) + _SEAM_ROOM
+        found = search(window, own, boxes, capacity=capacity, sweeps=sweeps)
+        # One that grew over a border before the boxes beyond it were tried stands in the way of better ones.
+        free = own[~at_borders(own, rounds.greedy)]
+        if len(free) == len(own):
+            return found
+        again = search(window, free, boxes, capacity=capacity, sweeps=sweeps)
+        return again if window_energy(window, again) < window_energy(window, found) else found
 
     rectangles, largest = np.empty((0, 5)), model.largest_side
     if parameters.start == "greedy":

@@ -129,6 +129,27 @@ def test_a_large_scene_in_squares_finds_what_one_square_finds():
     assert shared > 0.93 * max(whole.areas.sum(), tiled.areas.sum())
 
 
+@pytest.mark.parametrize("border", [22, 24, 28, 30])
+def test_a_building_of_three_wings_is_found_wherever_a_border_of_squares_divides_it(border):
+    wings = ((1014, 2020, 1028, 2030, 6.0, 0.0), (1028, 2016, 1046, 2034, 6.0, 0.0), (1022, 2030, 1028, 2040, 5.0, 0.0))
+    points = cloud(4, roofs=wings, trees=())
+    # Borders lie at multiples of 128 m.
+    moved = replace(points, x=points.x - 1000 + 10 * 128 - border)
+    west = 10.0 * 128 - border
+    extent = (west, 2010.0, west + 60, 2046.0)
+    grid = Grid.covering(extent, 2.0)
+    x, _ = grid.to_world(*np.meshgrid(np.arange(grid.rows) + 0.5, np.arange(grid.columns) + 0.5, indexing="ij"))
+    dem = Elevation((3.0 + 0.02 * (x - west)).astype(np.float32), grid)
+    place = Scene("made", extent, crs="EPSG:25832", points=moved, dem=dem)
+    found = make_detector("mpp[level=part]").detect(place, np.random.default_rng(0))
+    offset = np.array([west - 1000, 0, west - 1000, 0])
+    truth = shapely.box(*(np.array([wing[:4] for wing in wings]) + offset).T)
+    shares = shapely.area(shapely.intersection(found.polygons[:, None], truth))
+    shares /= shapely.area(shapely.union(found.polygons[:, None], truth))
+    assert len(found) == 3
+    assert (shares.max(axis=0) > 0.8).all()
+
+
 @pytest.mark.parametrize(
     "points",
     [
