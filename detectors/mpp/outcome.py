@@ -63,7 +63,9 @@ def as_footprints(
     if level == "block":
         attributes: dict[str, NDArray[Any]] = {"part_of": np.arange(len(blocks))}
         return Footprints.of(blocks, crs=crs, attributes=attributes, metadata=record, source=source)
-    levels = find_levels(rectangles, blocks, prepared.height, prepared.state, prepared.grid, prepared.image_of)
+    levels = find_levels(
+        rectangles, blocks, prepared.height, prepared.state, prepared.grid, prepared.image_of, prepared.structures
+    )
     main = levels.rectangle_of_part
     energy: NDArray[Any] = energies[main] / np.bincount(main, minlength=len(rectangles))[main]
     outlines, part_of = levels.parts, levels.building_of_part

@@ -14,10 +14,12 @@ valley
 colour edge
     Length of the median over the lines of the difference of colour (shares of red and of blue) between the two sides
     of a station, and the share of the lines whose difference points that way and exceeds the noise.
+raised wall
+    A parapet or a chimney above the roofs on both sides (`raised_walls`).
 party wall
-    A station with a step, a valley or a colour edge through most of the lines, at least `_NARROWEST` from other ones
-    and from the ends. Walls are found twice: *certain* ones show that a building is a row, *probable* ones cut a row
-    into houses.
+    A station with a step, a valley, a parapet or a colour edge through most of the lines, or with a chimney, at least
+    `_NARROWEST` from other ones and from the ends. Walls are found twice: *certain* ones show that a building is a
+    row, *probable* ones cut a row into houses. A chimney is certain in a series, else probable.
 
 The thresholds were chosen on the development scenes (docs/results/mpp.md), not on scenes kept for tests.
 """
@@ -32,10 +34,22 @@ from numpy.typing import NDArray
 from ...scenes.geodata.raster import Grid
 from .arrays import Floats, Rectangles
 from .cells import HIGH
+from .profiles import line_medians, station_means
+from .raised_walls import chimneys, parapet_strength, repeated, rises, series
 from .rectangles import corners
 from .wall_colours import Colours, colours_at
 
-__all__ = ["CERTAIN", "PROBABLE", "Wall", "WallRule", "colour_strength", "most_walls", "party_walls", "wall_strength"]
+__all__ = [
+    "CERTAIN",
+    "PROBABLE",
+    "Wall",
+    "WallRule",
+    "colour_strength",
+    "most_walls",
+    "party_walls",
+    "raised_strength",
+    "wall_strength",
+]
 
 #: Metres: spacing of the lattice, narrowest house, smallest depth of a rectangle with walls (the front or the rear half
 #: of a row often has one of its own), widest house of a row (median).
@@ -44,11 +58,14 @@ _LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 3.5, 12.0
 _REACH, _SHOULDER = 2, 2
 #: Stations that the mean of colours reaches on either side: they are blurred by a pixel, and pixels are displaced.
 _COLOUR_REACH = 3
-#: Metres: deepest houses whose colours differ; on deeper roofs patches of membrane and gravel do.
+#: Metres: deepest houses; on deeper roofs patches of membrane and gravel differ in colour, and plant rises.
 _DEEPEST = 16.0
 #: Share of the least colour edge that is noise, share of the lines that must have colours, and metres of a step that a
 #: difference of 1 counts like.
 _COLOUR_NOISE, _KNOWN_COLOUR, _COLOUR_METRES = 0.5, 0.5, 20.0
+#: Metres of a step that a chimney counts like, and least rise of a pitched roof from eaves to ridge: vents of flat
+#: roofs stand anywhere, and their ducts and sections rise in lines.
+_CHIMNEY_METRES, _PITCHED = 0.3, 1.0
 #: Metres: height differences that are noise, for steps and for valleys.
 _STEP_NOISE, _VALLEY_NOISE = 0.12, 0.25
 #: Share of the lines that must have heights for a step, and for a valley.
@@ -71,6 +88,10 @@ class WallRule(NamedTuple):
         Least median over the lines, m.
     colour_share, colour : float
         The same of a colour edge, which has no unit.
+    parapet_share, parapet : float
+        The same of a parapet, m.
+    single : bool
+        Whether chimneys count that belong to no series.
     """
 
     step_share: float
@@ -79,10 +100,13 @@ class WallRule(NamedTuple):
     valley: float
     colour_share: float
     colour: float
+    parapet_share: float
+    parapet: float
+    single: bool
 
 
-CERTAIN = WallRule(0.75, 0.25, 0.75, 0.4, 0.75, 0.02)
-PROBABLE = WallRule(0.5, 0.1, 0.5, 0.15, 0.6, 0.01)
+CERTAIN = WallRule(0.75, 0.25, 0.75, 0.4, 0.75, 0.02, 0.65, 0.15, False)
+PROBABLE = WallRule(0.5, 0.1, 0.5, 0.15, 0.6, 0.01, 0.65, 0.1, True)
 
 
 class Wall(NamedTuple):
@@ -106,6 +130,7 @@ def party_walls(
     grid: Grid,
     rule: WallRule,
     colours: Colours | None = None,
+    structures: NDArray[np.uint8] | None = None,
 ) -> list[Wall]:
     """Return the party walls across the longer side of a rectangle, in order; none where houses would be wide.
 
@@ -121,6 +146,8 @@ def party_walls(
     rule : WallRule
     colours : Colours, optional
         Around the rectangle, where there is an image.
+    structures : ndarray of uint8, shape (rows, columns), optional
+        Height of what stands on the roofs, cm.
     """
     place = corners(rectangle)[0] * grid.gsd
     first, second = place[1] - place[0], place[3] - place[0]
@@ -132,14 +159,18 @@ def party_walls(
         return []
     u, v = first / length, second / depth
     stations = np.arange(_LATTICE / 2, length, _LATTICE)
-    lines = np.arange(_LATTICE / 2, depth, _LATTICE)[1:-1]
+    lines = np.arange(_LATTICE / 2, depth, _LATTICE)
     x, y = (place[0] + stations[:, None, None] * u + lines[None, :, None] * v).transpose(2, 0, 1) / grid.gsd
     column = np.clip(_cell_of(x), 0, grid.columns - 1)
     row = np.clip(_cell_of(y), 0, grid.rows - 1)
     high = state[row, column] == HIGH
-    strength = wall_strength(np.where(high, height[row, column] / 100.0, np.nan), rule)
+    profile = np.where(high, height[row, column] / 100.0, np.nan)
+    inner = np.s_[:, 1:-1]
+    strength = wall_strength(profile[inner], rule)
     if colours is not None and depth <= _DEEPEST:
-        strength += colour_strength(np.where(high, colours_at(colours, row, column), np.nan), rule)
+        strength += colour_strength(np.where(high, colours_at(colours, row, column), np.nan)[:, :, 1:-1], rule)
+    if structures is not None:
+        strength += raised_strength(profile, profile + structures[row, column] / 100.0, rule)
     found: list[float] = []
     for station in np.argsort(-strength, kind="stable"):
         if strength[station] <= 0:
@@ -164,12 +195,12 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     strength = np.zeros(count)
     if count < 2 * (_REACH + _SHOULDER):
         return strength
-    means = _means(profile, _REACH)  # of stations i to i + _REACH - 1
+    means = station_means(profile, _REACH)  # of stations i to i + _REACH - 1
     before, behind = np.full_like(profile, np.nan), np.full_like(profile, np.nan)
     before[_REACH:], behind[: len(means)] = means[: count - _REACH], means
     step = behind - before
     known = np.isfinite(step)
-    middle = _median(step)
+    middle = line_medians(step)
     agree = known & (np.sign(step) == np.sign(middle)[:, None]) & (np.abs(step) > _STEP_NOISE)
     enough = known.mean(axis=1) >= _KNOWN_STEP
     share = agree.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
@@ -184,10 +215,34 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     right[: len(means) - _SHOULDER] = means[_SHOULDER:]
     valley = (left + right) / 2 - low
     known = np.isfinite(valley)
-    middle = _median(valley)
+    middle = line_medians(valley)
     share = (known & (valley > _VALLEY_NOISE)).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     sunk = (known.mean(axis=1) >= _KNOWN_VALLEY) & (share >= rule.valley_share) & (middle >= rule.valley)
     strength[sunk] += middle[sunk]
+    return strength
+
+
+def raised_strength(roof: Floats, profile: Floats, rule: WallRule) -> Floats:
+    """Return the evidence of parapets and chimneys for a wall before each station, m, shape (stations,).
+
+    Parameters
+    ----------
+    roof, profile : ndarray, shape (stations, lines)
+        Heights of all lines without and with what stands on the roofs.
+    rule : WallRule
+    """
+    count, lines = profile.shape
+    if _LATTICE * lines > _DEEPEST:
+        return np.zeros(count)
+    rise = rises(profile)
+    strength = parapet_strength(rise[:, 1:-1], rule.parapet_share, rule.parapet)
+    section = line_medians(roof[:, 1:-1].T, np.nan)
+    section = section[np.isfinite(section)]
+    if len(section) == 0 or np.ptp(section) < _PITCHED:
+        return repeated(strength)
+    found = chimneys(rise)
+    for station in found if rule.single else series(found):
+        strength[round(float(station))] += _CHIMNEY_METRES
     return strength
 
 
@@ -206,9 +261,9 @@ def colour_strength(shares: Floats, rule: WallRule) -> Floats:
         return strength
     edges = np.full((2, count, lines), np.nan)
     for edge, share in zip(edges, shares, strict=True):
-        means = _means(share, _COLOUR_REACH)
+        means = station_means(share, _COLOUR_REACH)
         edge[_COLOUR_REACH : 1 - _COLOUR_REACH] = means[_COLOUR_REACH:] - means[:-_COLOUR_REACH]
-    middle = np.stack([_median(edge) for edge in edges])
+    middle = np.stack([line_medians(edge) for edge in edges])
     size = np.hypot(*middle)
     known = np.isfinite(edges).all(axis=0)
     along = (edges * middle[:, :, None]).sum(axis=0) / np.maximum(size, 1e-12)[:, None]
@@ -217,22 +272,3 @@ def colour_strength(shares: Floats, rule: WallRule) -> Floats:
     seen = (known.mean(axis=1) >= _KNOWN_COLOUR) & (share >= rule.colour_share) & (size >= rule.colour)
     strength[seen] = _COLOUR_METRES * size[seen]
     return strength
-
-
-def _means(profile: Floats, reach: int) -> Floats:
-    """Return the mean of the known heights of `reach` stations in a row, shape (stations - reach + 1, lines)."""
-    known = np.isfinite(profile)
-    total = np.cumsum(np.vstack([np.zeros((1, profile.shape[1])), np.where(known, profile, 0.0)]), axis=0)
-    number = np.cumsum(np.vstack([np.zeros((1, profile.shape[1]), dtype=np.int64), known]), axis=0)
-    total, number = total[reach:] - total[:-reach], number[reach:] - number[:-reach]
-    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
-
-
-def _median(values: Floats) -> Floats:
-    """Return the median of the known values of each station, 0 without any."""
-    # Not np.nanmedian, whose masked arrays take longer than all the rest. Unknown values are sorted to the end.
-    ordered = np.sort(values, axis=1)
-    count = np.isfinite(ordered).sum(axis=1)
-    station = np.arange(len(values))
-    middle = 0.5 * (ordered[station, np.maximum(count - 1, 0) // 2] + ordered[station, count // 2])
-    return np.where(count > 0, middle, 0.0)

@@ -68,6 +68,8 @@ class Prepared:
         See `cells`.
     score : ndarray of int16, shape (rows, columns)
         Thousandths of a nat.
+    structures : ndarray of uint8, shape (rows, columns)
+        Centimetres, at most 255, by which cells were lowered to the roof below them.
     background : Background
     tables : Tables
         `tables.NO_TABLES` after use.
@@ -85,6 +87,7 @@ class Prepared:
     height: NDArray[np.uint16]
     state: States
     score: Scores
+    structures: NDArray[np.uint8]
     background: Background
     tables: Tables
     model: Model
@@ -103,7 +106,7 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
             f"not reach over more than {LONGEST} cells: lower it to {math.floor(LONGEST * cell / math.sqrt(2))}, "
             f"or raise cell"
         )
-    background, height, state, score, fitted, cues = _classes(parameters, points, scene, cell, threads)
+    background, height, state, score, fitted, structures, cues = _classes(parameters, points, scene, cell, threads)
     least = math.ceil(_SMALLEST_BOX / cell**2)
     division = _division(parameters, Grid.covering(scene.extent, cell))
     boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, division=division, threads=threads)
@@ -113,7 +116,9 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
     tables = make_tables(kept, fitted, score, threads=threads)
     model, grid = _model(parameters, cell), Grid.covering(scene.extent, cell)
     rated = _rated(boxes, tables, model, threads)
-    return Prepared(grid, kept, state, score, background, tables, model, rated, cues, scene.core, lambda: scene.image)
+    return Prepared(
+        grid, kept, state, score, structures, background, tables, model, rated, cues, scene.core, lambda: scene.image
+    )
 
 
 def _division(parameters: MPPParameters, grid: Grid) -> Division:
@@ -143,6 +148,18 @@ def _shortened(height: Heights, threads: Threads) -> NDArray[np.uint16]:
     return short
 
 
+def _lowered_by(before: Heights, after: Heights, threads: Threads) -> NDArray[np.uint8]:
+    """Return by how many centimetres, at most 255, cells were lowered."""
+    lowered = np.empty(before.shape, dtype=np.uint8)
+
+    def work(first: int, last: int) -> None:
+        fall = before[first:last] - after[first:last]
+        np.clip(fall, 0, 255, out=lowered[first:last], casting="unsafe")
+
+    threads.bands(work, len(lowered))
+    return lowered
+
+
 class _Classes(NamedTuple):
     """Classes of a scene, and what they make of its cells; attributes as in `Prepared`."""
 
@@ -151,11 +168,12 @@ class _Classes(NamedTuple):
     state: States
     score: Scores
     fitted: Mask
+    structures: NDArray[np.uint8]
     cues: CueInformation
 
 
 def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: float, threads: Threads) -> _Classes:
-    """Return the classes of the scene, and height, state, score and whether it is fitted of each cell."""
+    """Return the classes of the scene, and height, state, score, whether it is fitted and structures of each cell."""
     low = _LOW_SHARE * parameters.least_height
     grid, ground = Grid.covering(scene.extent, cell), scene.heights.ground
     cells = make_cells(points, ground, grid, low=low, threads=threads)
@@ -169,6 +187,7 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
     background = estimate_background(tally, cell, openness=PENETRATION in cues.used)
     weights = weights_of(parameters)
     fitted = fitted_cells(cells, bins, background, weights, threads=threads)
+    structures = np.zeros(cells.state.shape, dtype=np.uint8)
     if parameters.carried_share <= 1:
         height, state = lower_superstructures(
             cells.height,
@@ -180,13 +199,14 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
             division=_division(parameters, grid),
             threads=threads,
         )
+        structures = _lowered_by(cells.height, height, threads)
         cells = replace(cells, height=height, state=state)
         bins = textures(cells.height, cells.state, cells.openness, threads=threads)
         fitted = fitted_cells(cells, bins, background, weights, threads=threads)
     score = score_cells(cells, bins, background, weights, threads=threads)
     if MULTIPLE not in cues.used and parameters.texture_weight > 0:
         score, cues = _with_image(scene, cells, score, cues, parameters.texture_weight)
-    return _Classes(background, cells.height, cells.state, score, fitted, cues)
+    return _Classes(background, cells.height, cells.state, score, fitted, structures, cues)
 
 
 def _with_image(

@@ -7,10 +7,11 @@ part
 block
     All that is built together (`blocks`).
 row
-    A block at least `_SHORTEST` metres long with at least `_CERTAIN_WALLS` certain party walls, or a long and
-    narrow one with `_WALLS_OF_LONG`, of which one part has `_REPEATED`: houses of a row repeat under one line of
-    roofs, while the wings of one building have a step each. Its parts are cut at their probable party walls, and
-    each piece is a house of its own unless smaller than `_ANNEX`.
+    A block at least `_SHORTEST` metres long with at least `_CERTAIN_WALLS` certain party walls, or a long and narrow
+    one with `_WALLS_OF_LONG`, of which one part has `_REPEATED`: houses of a row repeat under one line of roofs, while
+    the wings of one building have a step each. Bends (`bends`) are certain walls if there are `_CERTAIN_WALLS`; a
+    building with wings has one or two. The parts of a row are cut at their probable party walls, and each piece is a
+    house of its own unless smaller than `_ANNEX`.
 building
     A block that is no row with all its parts, or a house of a row with its annexes. A part outside all blocks is a
     building, too.
@@ -28,6 +29,7 @@ from numpy.typing import NDArray
 
 from ...scenes.geodata.raster import Grid, Image
 from .arrays import Rectangles
+from .bends import count_bends
 from .buildings import block_of, outline_buildings
 from .party_walls import CERTAIN, PROBABLE, Wall, most_walls, party_walls
 from .rectangles import to_world
@@ -88,6 +90,7 @@ def find_levels(
     state: NDArray[np.uint8],
     grid: Grid,
     image_of: Callable[[], Image | None] = lambda: None,
+    structures: NDArray[np.uint8] | None = None,
 ) -> Levels:
     """Return parts and buildings.
 
@@ -104,6 +107,8 @@ def find_levels(
     grid : Grid
     image_of : callable
         Returns the image of the scene; called only where a block has room for a row.
+    structures : ndarray of uint8, shape (rows, columns), optional
+        Height of what stands on the roofs, cm.
     """
     block = block_of(shapely.polygons(to_world(rectangles, grid)), blocks)
     inside = block >= 0
@@ -114,8 +119,14 @@ def find_levels(
     image = image_of() if looked_at.any() else None
     colours = {number: colours_of(blocks[number], image, grid) for number in np.unique(block[looked_at]).tolist()}
     for k in np.flatnonzero(looked_at).tolist():
-        certain[k] = len(party_walls(rectangles[k], height, state, grid, CERTAIN, colours[block[k]]))
+        certain[k] = len(party_walls(rectangles[k], height, state, grid, CERTAIN, colours[block[k]], structures))
     walls_of_block = np.bincount(block[inside], weights=certain[inside], minlength=len(blocks))
+    for number in np.unique(block[looked_at]).tolist():
+        members = np.flatnonzero(block == number)
+        bends, of_part = count_bends(rectangles[members], grid.gsd)
+        if bends >= _CERTAIN_WALLS:
+            walls_of_block[number] += bends
+            certain[members] += of_part
     most_of_block = np.zeros(len(blocks), dtype=np.int64)
     np.maximum.at(most_of_block, block[inside], certain[inside])
     row = _are_rows(blocks, walls_of_block) & (most_of_block >= _REPEATED)
@@ -141,7 +152,9 @@ def find_levels(
             block_of_building.append(number)
             continue
         near = colours[number]
-        walls = [party_walls(rectangle, height, state, grid, PROBABLE, near) for rectangle in rectangles[members]]
+        walls = [
+            party_walls(rectangle, height, state, grid, PROBABLE, near, structures) for rectangle in rectangles[members]
+        ]
         pieces, owners = _pieces(rectangles[members], blocks[number], walls, grid)
         group = _houses(pieces, owners)
         parts += pieces

@@ -22,7 +22,7 @@ import shapely
 
 import roofbench as rb
 from roofbench.core.errors import MissingInputError
-from roofbench.detectors.mpp import block_cells, mpp_detector, preparation, rows
+from roofbench.detectors.mpp import bends, block_cells, mpp_detector, preparation, raised_walls, rows
 from roofbench.evaluators.threshold_free.causes import CAUSES, loss_by_cause
 from roofbench.scenes.geodata.vector_files import read_footprints
 
@@ -40,6 +40,11 @@ THRESHOLDS = {
     "certain party walls of a row": (rows, "_CERTAIN_WALLS", 1000, (2, 3, 4, 1000)),
     "certain party walls of a long row": (rows, "_WALLS_OF_LONG", 1000, (2, 3, 1000)),
     "certain party walls of one part of a row": (rows, "_REPEATED", 0, (0, 2, 3, 4)),
+    "rise of a chimney, m": (raised_walls, "_CHIMNEY", 1000, (0.4, 0.6, 0.8, 1.0, 1000)),
+    "chimneys of a series": (raised_walls, "_FEWEST", 1000, (2, 3, 4, 1000)),
+    "share of the chimneys in a series": (raised_walls, "_MOST", None, (0.5, 0.6, 0.75, 0.9)),
+    "standard deviations of a parapet": (raised_walls, "_BEYOND", 1000, (1.5, 2.0, 2.5, 3.0, 1000)),
+    "least change of direction, degrees": (bends, "_LEAST", 90, (3, 5, 8, 90)),
 }  # fmt: skip
 
 

@@ -13,12 +13,12 @@ from roofbench.detectors.mpp.cells import HIGH, LOW
 from roofbench.detectors.mpp.party_walls import (
     CERTAIN,
     PROBABLE,
-    _median,
     colour_strength,
     most_walls,
     party_walls,
     wall_strength,
 )
+from roofbench.detectors.mpp.profiles import line_medians
 from roofbench.detectors.mpp.rectangles import to_world
 from roofbench.detectors.mpp.rows import find_levels
 from roofbench.scenes.geodata.raster import Grid, Image
@@ -295,4 +295,4 @@ def test_medians_of_stations_are_those_of_their_known_values(lines):
     values = np.random.default_rng(lines).normal(size=(60, lines))
     values[np.random.default_rng(0).random(values.shape) < 0.5] = np.nan
     known = [row[np.isfinite(row)] for row in values]
-    assert _median(values).tolist() == [np.median(row) if len(row) else 0.0 for row in known]
+    assert line_medians(values).tolist() == [np.median(row) if len(row) else 0.0 for row in known]
