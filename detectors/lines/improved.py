@@ -305,5 +305,5 @@ class Improved(LineDetector):
             # A threshold of 0 makes everything vegetation.
             mean_in_boxes(rasters.cover.vegetation, candidates) / max(self._index_limit(rasters.image), _LEAST_LIMIT),
             mean_roughness(rasters.roughness, candidates),
-            lengths(candidates) * widths(candidates) * rasters.gsd**2,
+            gradients.independent(lengths(candidates) * widths(candidates) * rasters.gsd**2),
         )

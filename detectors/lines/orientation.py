@@ -8,10 +8,13 @@ alignment
     edges have all directions, as those of a crown.
 concentration
     The same for the direction t0 that makes it largest, 0 to 1: also a roof whose rectangle is turned has it.
-evidence
-    Square root of the area of a candidate, at most that of 150 m2, per 10 m: directions of few edges agree by chance.
+independent directions
+    Number of directions in a rectangle that differ by more than blur: its area divided by 4.4 squared scales, the area
+    over which the gradient is correlated in crowns of every kind of image. The concentration of n directions without a
+    preferred one is 1/sqrt(n) on average, so that both measures are multiplied by sqrt(n): a coarse image, or a small
+    rectangle, has few edges, which agree by chance.
 score
-    Weighted sum of alignment and concentration, both times the evidence, scaled entropy (see `entropy_scale`), relative
+    Weighted sum of alignment and concentration, both in units of chance, scaled entropy (see `entropy_scale`), relative
     vegetation index and logarithm of the roughness of the laser points (see `box_roughness`); above zero the candidate
     is a building. The weights are those of a logistic regression on candidates of synthetic scenes
     (`tests/performance/study_texture.py fit`), rounded.
@@ -50,14 +53,14 @@ __all__ = [
 _SCALE = 0.35
 #: Largest pixel of the gradients, metres.
 _PIXEL = 0.25
+#: Area in which the gradients of a crown are correlated, squared scales (median of synthetic scenes: 2.7 to 5).
+_CORRELATED = 4.4
 #: Weights of alignment, concentration, scaled entropy, vegetation index and roughness, and the constant.
-WEIGHTS: Final = (4.7, 12.1, -1.5, -2.0, -8.8, 5.9)
+WEIGHTS: Final = (0.43, 0.94, -1.6, -2.1, -9.0, 6.2)
 #: Ranges that the first four are clipped to: beyond them they say no more.
-_RANGES: Final = ((-0.1, 0.35), (0.0, 0.4), (-0.5, 1.5), (0.0, 2.0))
+_RANGES: Final = ((-1.0, 3.0), (0.0, 4.0), (-0.5, 1.5), (0.0, 2.0))
 #: Roughness of measure 0 and of measure 1, metres, and where it is unknown.
 _SMOOTH, _ROUGH, _UNKNOWN = 0.1, 1.0, 0.35
-#: Side of a square of evidence 1, metres, and the largest evidence.
-_SIDE, _MOST = 10.0, 1.225
 
 
 class Gradients(NamedTuple):
@@ -71,12 +74,19 @@ class Gradients(NamedTuple):
         m cos 4t and m sin 4t, where t is its direction.
     pixel : int
         Pixels of the image along a side of one cell.
+    scale : float
+        Standard deviation of the Gaussian that smoothed the image, metres.
     """
 
     strength: NDArray[np.int32]
     cosine: NDArray[np.int32]
     sine: NDArray[np.int32]
     pixel: int
+    scale: float
+
+    def independent(self, areas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the number of independent directions in areas, square metres."""
+        return areas / (_CORRELATED * self.scale**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +95,7 @@ class Oriented:
 
     Attributes
     ----------
-    alignment, concentration, entropy, vegetation, roughness, score : ndarray, shape (k,)
+    alignment, concentration, entropy, vegetation, roughness, independent, score : ndarray, shape (k,)
         See `orientation`, `entropy_scale`, `box_roughness` (m); the vegetation index is a multiple of its threshold.
     """
 
@@ -94,6 +104,7 @@ class Oriented:
     entropy: NDArray[np.float64]
     vegetation: NDArray[np.float64]
     roughness: NDArray[np.float64]
+    independent: NDArray[np.float64]
     score: NDArray[np.float64]
 
     @property
@@ -140,10 +151,11 @@ def gradient_sums(grey: NDArray[np.uint8], gsd: float, *, own_pixel: float = 0.0
     coarse = grey[:rows, :columns]
     if pixel > 1:
         coarse = cv2.resize(coarse, (columns // pixel, rows // pixel), interpolation=cv2.INTER_AREA)
-    smooth = cv2.GaussianBlur(coarse.astype(np.float32), (0, 0), max(_SCALE, own_pixel) / (gsd * pixel))
+    scale = max(_SCALE, own_pixel)
+    smooth = cv2.GaussianBlur(coarse.astype(np.float32), (0, 0), scale / (gsd * pixel))
     dx, dy = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
     strength, cosine, sine = _prefixes(dx, dy)
-    return Gradients(strength, cosine, sine, pixel)
+    return Gradients(strength, cosine, sine, pixel, scale)
 
 
 @kernel
@@ -174,7 +186,7 @@ def score_candidates(
     entropy: NDArray[np.float64],
     vegetation: NDArray[np.float64],
     roughness: NDArray[np.float64],
-    areas: NDArray[np.float64],
+    independent: NDArray[np.float64],
 ) -> Oriented:
     """Return the scores of candidates.
 
@@ -186,13 +198,13 @@ def score_candidates(
         Scaled entropy, and mean vegetation index as a multiple of its threshold.
     roughness : ndarray, shape (k,)
         Metres, NaN where unknown.
-    areas : ndarray, shape (k,)
-        Square metres.
+    independent : ndarray, shape (k,)
+        Number of independent directions.
     """
     score = np.full(len(directed), WEIGHTS[-1])
-    for values, weight in zip(clipped_measures(directed, entropy, vegetation, roughness, areas), WEIGHTS, strict=False):
+    for values, weight in zip(clipped_measures(directed, entropy, vegetation, roughness, independent), WEIGHTS, strict=False):
         score += weight * values
-    return Oriented(directed[:, 0], directed[:, 1], entropy, vegetation, roughness, score)
+    return Oriented(directed[:, 0], directed[:, 1], entropy, vegetation, roughness, independent, score)
 
 
 def clipped_measures(
@@ -200,16 +212,11 @@ def clipped_measures(
     entropy: NDArray[np.float64],
     vegetation: NDArray[np.float64],
     roughness: NDArray[np.float64],
-    areas: NDArray[np.float64],
+    independent: NDArray[np.float64],
 ) -> list[NDArray[np.float64]]:
-    """Return the five measures of `score_candidates` as they are weighted, the first two times the evidence."""
-    evidence = np.minimum(np.sqrt(areas) / _SIDE, _MOST)
-    measures = (directed[:, 0], directed[:, 1], entropy, vegetation)
+    """Return the five measures of `score_candidates` as they are weighted, the first two in units of chance."""
+    chance = np.sqrt(independent)
+    measures = (chance * directed[:, 0], chance * directed[:, 1], entropy, vegetation)
     clipped = [np.clip(values, low, high) for values, (low, high) in zip(measures, _RANGES, strict=True)]
     deviation = np.clip(np.nan_to_num(roughness, nan=_UNKNOWN), _SMOOTH, _ROUGH)
-    return [
-        evidence * clipped[0],
-        evidence * clipped[1],
-        *clipped[2:],
-        np.log(deviation / _SMOOTH) / math.log(_ROUGH / _SMOOTH),
-    ]
+    return [*clipped, np.log(deviation / _SMOOTH) / math.log(_ROUGH / _SMOOTH)]

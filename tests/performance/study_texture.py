@@ -72,7 +72,7 @@ def table(seeds, selections, kinds):
 
 
 def candidates(seeds, kinds):
-    """Yield preset and kind, and of each candidate: share inside references, measures, area."""
+    """Yield preset and kind, and of each candidate: share inside references, measures."""
     import shapely
 
     from roofbench.detectors.lines.boxes import box_corners
@@ -90,8 +90,8 @@ def candidates(seeds, kinds):
                 share = shapely.area(shapely.intersection(boxes, known)) / area
                 measured = trace.texture
                 columns = (measured.alignment, measured.concentration, measured.entropy, measured.vegetation)
-                columns += (measured.roughness,)
-                yield f"{kind}, {preset}", np.stack([share, *columns, area], axis=1)
+                columns += (measured.roughness, measured.independent)
+                yield f"{kind}, {preset}", np.stack([share, *columns], axis=1)
 
 
 def fit(seeds, kinds):

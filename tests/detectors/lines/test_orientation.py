@@ -74,8 +74,8 @@ def test_directions_do_not_depend_on_the_contrast(degrees, factor):
     np.testing.assert_allclose(found[0], found[1], atol=0.03)
 
 
-def scored(directed=(0.1, 0.2), entropy=0.5, green=0.5, rough=0.5, area=80.0):
-    return score_candidates(np.array([directed]), *np.array([[entropy], [green], [rough], [area]]))
+def scored(directed=(0.1, 0.2), entropy=0.5, green=0.5, rough=0.5, independent=150.0):
+    return score_candidates(np.array([directed]), *np.array([[entropy], [green], [rough], [independent]]))
 
 
 def test_more_direction_and_less_entropy_green_and_roughness_raise_the_score():
@@ -105,12 +105,25 @@ def test_the_gradient_of_interpolated_pixels_is_taken_at_their_own_scale():
     assert own[0] > fixed[0] + 0.1
 
 
-def test_small_candidates_have_less_evidence():
-    small, large = (
-        clipped_measures(np.array([[0.3, 0.3]]), *np.array([[0.0], [0.0], [0.2], [area]])) for area in (9.0, 100.0)
-    )
-    assert small[0][0] == pytest.approx(0.3 * large[0][0])
-    assert small[2:] == large[2:]
+@pytest.mark.parametrize("pixel", [0.0, 0.5, 1.0])
+def test_the_concentration_of_noise_in_units_of_chance_is_the_same_at_every_scale_and_size(pixel):
+    rng, found = np.random.default_rng(7), []
+    for _ in range(12):
+        gradients = gradient_sums(rng.integers(0, 255, (SIDE, SIDE)).astype(np.uint8), 0.25, own_pixel=pixel)
+        for length, width in ((40, 24), (80, 60)):
+            boxes = np.concatenate([box(degrees, length, width) for degrees in (0, 40)])
+            independent = gradients.independent(np.full(len(boxes), length * width / 16))
+            found.append(directions(gradients, boxes)[:, 1] ** 2 * independent)
+    # White noise is correlated over less than crowns, whose units these are.
+    assert 0.2 < np.mean(found) < 0.7
+
+
+def test_the_same_directions_say_more_in_a_large_or_fine_candidate():
+    directed, others = np.array([[0.1, 0.1]] * 2), np.array([[0.0], [0.0], [0.2]])
+    few, many = (clipped_measures(directed[:1], *others, np.array([count])) for count in (25.0, 100.0))
+    assert (few[0], few[1]) == (pytest.approx(0.5), pytest.approx(0.5))
+    assert (many[0], many[1]) == (pytest.approx(1.0), pytest.approx(1.0))
+    assert few[2:] == many[2:]
 
 
 def textured(gsd, seed=2):
