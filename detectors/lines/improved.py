@@ -19,7 +19,7 @@ from ...core.parameters import parameter
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
 from .adjustment import adjust_to_neighbours, adjust_to_shape
-from .box_roughness import Roughness, mean_roughness, roughness_sums
+from .box_smoothness import Smoothness, mean_smoothness, smoothness_sums
 from .boxes import Boxes, lengths, prefix_sums, widths
 from .entropy import coarse_entropy, grey_levels
 from .entropy_scale import EntropyScale, entropy_scale
@@ -154,8 +154,8 @@ class Improved(LineDetector):
     texture: str = parameter(
         "score", choices=("score", "tests", "none"),
         doc="how candidates are tested: by a score of the directions of the brightness gradient, entropy, vegetation "
-        "and roughness of the laser points; by the six printed tests of edge orientation histograms; not at all, which "
-        "the print allows",
+        "and smoothness of the laser points; by the six printed tests of edge orientation histograms; not at all, "
+        "which the print allows",
         source="2011, 3.4; reading",
     )  # fmt: skip
     edge_blur: float = parameter(
@@ -209,12 +209,12 @@ class Improved(LineDetector):
         prefix: NDArray[np.int32] = prefix_sums(entropy)
         return prefix, limit, scale
 
-    def _roughness(
+    def _smoothness(
         self, points: PointCloud, heights: NDArray[np.float64], grid: Grid, spacing: float
-    ) -> Roughness | None:
+    ) -> Smoothness | None:
         if self.texture != "score":
             return None
-        return roughness_sums(points, heights, grid, spacing=spacing, threshold=self.height)
+        return smoothness_sums(points, heights, grid, spacing=spacing, threshold=self.height)
 
     def _same_kind(self) -> bool:
         return self.green_extension == "same"
@@ -296,7 +296,7 @@ class Improved(LineDetector):
     def _oriented(self, candidates: Boxes, rasters: Rasters) -> Oriented:
         """Return the measures of candidates, and their scores."""
         assert rasters.scale is not None
-        assert rasters.roughness is not None
+        assert rasters.smoothness is not None
         gradients = gradient_sums(grey_levels(rasters.image), rasters.gsd, own_pixel=rasters.own_pixel)
         around = widened(candidates, self.texture_margin / rasters.gsd)
         return score_candidates(
@@ -304,6 +304,6 @@ class Improved(LineDetector):
             rasters.scale.scaled(mean_in_boxes(rasters.cover.entropy, candidates)),
             # A threshold of 0 makes everything vegetation.
             mean_in_boxes(rasters.cover.vegetation, candidates) / max(self._index_limit(rasters.image), _LEAST_LIMIT),
-            mean_roughness(rasters.roughness, candidates),
+            mean_smoothness(rasters.smoothness, candidates),
             gradients.independent(lengths(candidates) * widths(candidates) * rasters.gsd**2),
         )

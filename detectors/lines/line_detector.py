@@ -17,7 +17,7 @@ from ...scenes.geodata.raster import Grid, Image
 from ...scenes.scene import Scene
 from ..steps import Step
 from .adjustment import by_length, rotate
-from .box_roughness import Roughness
+from .box_smoothness import Smoothness
 from .boxes import UX, UY, Boxes, box_corners, lengths, prefix_sums, widths
 from .colours import Colours
 from .contours import trace_shapes
@@ -44,7 +44,10 @@ __all__ = ["LineDetector"]
 
 #: The edge of a mask lies half a pixel outside the centres of its border pixels.
 _OUTSET = 0.5
-#: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing of 0.5 m.
+#: Point spacing of the 2010 paper, metres. Outlines of denser points are not more certain: the positions of points err,
+#: and eaves are ragged. On closer curve points, chords get shorter than these errors, and sides break at false corners.
+_LEAST_SPACING = 0.5
+#: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing.
 _CURVE_STEP = 0.3
 #: Least length of a part of a side that is tested, point spacings: its first step then contains ten points or more.
 _EXTENSION_PART = 3.5
@@ -189,8 +192,8 @@ class LineDetector(LineParameters):
         if self.colour_smoothing > 0:
             rgb = np.stack([cv2.GaussianBlur(band, (3, 3), self.colour_smoothing) for band in rgb])
         colours = Colours.of(rgb, tenths=self.colour_bins == "tenths")
-        rough = self._roughness(points, points.z - ground, grid, spacing)
-        return Rasters(image, masks, cover, colours, spacing, limit, scale, own_pixel, rough)
+        smooth = self._smoothness(points, points.z - ground, grid, spacing)
+        return Rasters(image, masks, cover, colours, spacing, limit, scale, own_pixel, smooth)
 
     def _masks(self, points: PointCloud, thresholds: NDArray[np.float64], grid: Grid, spacing: float) -> Masks:
         clip = self.border == "drop"
@@ -210,10 +213,10 @@ class LineDetector(LineParameters):
         """Return the row prefix sums of the entropy, the mean above which green areas are trees, and its scale."""
         return _NO_ENTROPY, 0.0, None
 
-    def _roughness(
+    def _smoothness(
         self, points: PointCloud, heights: NDArray[np.float64], grid: Grid, spacing: float
-    ) -> Roughness | None:
-        """Return the roughness of the points, whose heights are above ground; none where it is not used."""
+    ) -> Smoothness | None:
+        """Return the smoothness of the points, whose heights are above ground; none where it is not used."""
         return None
 
     def _growth(self, rasters: Rasters) -> Growth:
@@ -243,7 +246,7 @@ class LineDetector(LineParameters):
             product=self.corner_product,
             straight=(self.corner_angle, 360.0 - self.corner_angle),
         )
-        missed = self.missed_corner or max(_MISSED_CORNER * rasters.spacing, _STAIRCASE * gsd)
+        missed = self.missed_corner or max(_MISSED_CORNER * max(rasters.spacing, _LEAST_SPACING), _STAIRCASE * gsd)
         segments = fit_segments(
             curves, points, corners, offsets, shortest=self.minimum_side / gsd - 2 * _OUTSET, deviation=missed / gsd
         )
@@ -309,7 +312,7 @@ class LineDetector(LineParameters):
     def _sample(self, rasters: Rasters) -> float:
         if self.curve_step is not None:
             return self.curve_step
-        return max(_CURVE_STEP * rasters.spacing, rasters.gsd / 3)
+        return max(_CURVE_STEP * max(rasters.spacing, _LEAST_SPACING), rasters.gsd / 3)
 
     def _extended(self, rasters: Rasters, lines: Boxes, green: NDArray[np.bool_]) -> Boxes:
         depth = self.extension / rasters.gsd

@@ -15,7 +15,7 @@ independent directions
     rectangle, has few edges, which agree by chance.
 score
     Weighted sum of alignment and concentration, both in units of chance, scaled entropy (see `entropy_scale`), relative
-    vegetation index and logarithm of the roughness of the laser points (see `box_roughness`); above zero the candidate
+    vegetation index and smoothness of the laser points (see `box_smoothness`); above zero the candidate
     is a building. The weights are those of a logistic regression on candidates of synthetic scenes
     (`tests/performance/study_texture.py fit`), rounded.
 
@@ -23,7 +23,7 @@ The six tests of the 2011 paper (`texture`) follow linked edges of three metres.
 of points, resampled or blurred, edges are ragged or missing and few chains of that length remain. The gradient at a
 scale in metres, or that of the image's own pixels where they are wider, is there in every image, and it needs no
 threshold of contrast. Where one or two points per square metre have a colour, no measure of the image separates a tree
-from a roof any more (area under the curve 0.6 to 0.7 in woods); the roughness of the points does (0.98).
+from a roof any more (area under the curve 0.6 to 0.7 in woods); the smoothness of the points does.
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ _SCALE = 0.35
 _PIXEL = 0.25
 #: Area in which the gradients of a crown are correlated, squared scales (median of synthetic scenes: 2.7 to 5).
 _CORRELATED = 4.4
-#: Weights of alignment, concentration, scaled entropy, vegetation index and roughness, and the constant.
-WEIGHTS: Final = (0.43, 0.94, -1.6, -2.1, -9.0, 6.2)
+#: Weights of alignment, concentration, scaled entropy, vegetation index and smoothness, and the constant.
+WEIGHTS: Final = (0.4, 0.6, -1.0, -1.3, 8.9, -3.7)
 #: Ranges that the first four are clipped to: beyond them they say no more.
 _RANGES: Final = ((-1.0, 3.0), (0.0, 4.0), (-0.5, 1.5), (0.0, 2.0))
-#: Roughness of measure 0 and of measure 1, metres, and where it is unknown.
-_SMOOTH, _ROUGH, _UNKNOWN = 0.1, 1.0, 0.35
+#: Smoothness where it is unknown.
+_UNKNOWN = 0.5
 
 
 class Gradients(NamedTuple):
@@ -95,15 +95,15 @@ class Oriented:
 
     Attributes
     ----------
-    alignment, concentration, entropy, vegetation, roughness, independent, score : ndarray, shape (k,)
-        See `orientation`, `entropy_scale`, `box_roughness` (m); the vegetation index is a multiple of its threshold.
+    alignment, concentration, entropy, vegetation, smoothness, independent, score : ndarray, shape (k,)
+        See `orientation`, `entropy_scale`, `box_smoothness`; the vegetation index is a multiple of its threshold.
     """
 
     alignment: NDArray[np.float64]
     concentration: NDArray[np.float64]
     entropy: NDArray[np.float64]
     vegetation: NDArray[np.float64]
-    roughness: NDArray[np.float64]
+    smoothness: NDArray[np.float64]
     independent: NDArray[np.float64]
     score: NDArray[np.float64]
 
@@ -185,7 +185,7 @@ def score_candidates(
     directed: NDArray[np.float64],
     entropy: NDArray[np.float64],
     vegetation: NDArray[np.float64],
-    roughness: NDArray[np.float64],
+    smoothness: NDArray[np.float64],
     independent: NDArray[np.float64],
 ) -> Oriented:
     """Return the scores of candidates.
@@ -196,27 +196,28 @@ def score_candidates(
         Alignment and concentration.
     entropy, vegetation : ndarray, shape (k,)
         Scaled entropy, and mean vegetation index as a multiple of its threshold.
-    roughness : ndarray, shape (k,)
-        Metres, NaN where unknown.
+    smoothness : ndarray, shape (k,)
+        0 to 1, NaN where unknown.
     independent : ndarray, shape (k,)
         Number of independent directions.
     """
     score = np.full(len(directed), WEIGHTS[-1])
-    for values, weight in zip(clipped_measures(directed, entropy, vegetation, roughness, independent), WEIGHTS, strict=False):
+    for values, weight in zip(
+        clipped_measures(directed, entropy, vegetation, smoothness, independent), WEIGHTS, strict=False
+    ):
         score += weight * values
-    return Oriented(directed[:, 0], directed[:, 1], entropy, vegetation, roughness, independent, score)
+    return Oriented(directed[:, 0], directed[:, 1], entropy, vegetation, smoothness, independent, score)
 
 
 def clipped_measures(
     directed: NDArray[np.float64],
     entropy: NDArray[np.float64],
     vegetation: NDArray[np.float64],
-    roughness: NDArray[np.float64],
+    smoothness: NDArray[np.float64],
     independent: NDArray[np.float64],
 ) -> list[NDArray[np.float64]]:
     """Return the five measures of `score_candidates` as they are weighted, the first two in units of chance."""
     chance = np.sqrt(independent)
     measures = (chance * directed[:, 0], chance * directed[:, 1], entropy, vegetation)
     clipped = [np.clip(values, low, high) for values, (low, high) in zip(measures, _RANGES, strict=True)]
-    deviation = np.clip(np.nan_to_num(roughness, nan=_UNKNOWN), _SMOOTH, _ROUGH)
-    return [*clipped, np.log(deviation / _SMOOTH) / math.log(_ROUGH / _SMOOTH)]
+    return [*clipped, np.nan_to_num(smoothness, nan=_UNKNOWN)]

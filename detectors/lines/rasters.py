@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ...scenes.geodata.raster import Grid, Image
-from .box_roughness import Roughness
+from .box_smoothness import Smoothness
 from .colours import Colours
 from .entropy_scale import EntropyScale
 from .extension import Cover
@@ -36,7 +36,7 @@ class Rasters:
         Scale of the image's entropy; none where it is not used.
     own_pixel : float
         Pixel of the image as it was given, metres: that of `image` may be finer.
-    roughness : Roughness, optional
+    smoothness : Smoothness, optional
         Of the laser points; none where it is not used.
     """
 
@@ -48,7 +48,7 @@ class Rasters:
     entropy_limit: float = 0.0
     scale: EntropyScale | None = None
     own_pixel: float = 0.0
-    roughness: Roughness | None = None
+    smoothness: Smoothness | None = None
 
     @property
     def gsd(self) -> float:

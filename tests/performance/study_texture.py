@@ -20,8 +20,8 @@ import roofbench as rb
 PRESETS = ("fairfield-1-small", "moonee-ponds-small", "knox-small")
 #: Points per square metre to point spacing, metres.
 DENSITIES = {1: 1.0, 2: 0.7071, 4: 0.5, 10: 0.3162}
-#: Weight of the squared weights: crowns of real trees are smoother than the generator's, so that roughness alone, which
-#: separates those almost without an error, must not decide.
+#: Weight of the squared weights: crowns of real trees are smoother than the generator's, so that smoothness alone,
+#: which separates those almost without an error, must not decide.
 RIDGE = 1e-3
 KINDS = {"original": {}} | {
     name: {"image_processing": name} for name in ("resampled", "compressed", "sharpened", "blurred")
@@ -90,7 +90,7 @@ def candidates(seeds, kinds):
                 share = shapely.area(shapely.intersection(boxes, known)) / area
                 measured = trace.texture
                 columns = (measured.alignment, measured.concentration, measured.entropy, measured.vegetation)
-                columns += (measured.roughness, measured.independent)
+                columns += (measured.smoothness, measured.independent)
                 yield f"{kind}, {preset}", np.stack([share, *columns], axis=1)
 
 

@@ -74,21 +74,21 @@ def test_directions_do_not_depend_on_the_contrast(degrees, factor):
     np.testing.assert_allclose(found[0], found[1], atol=0.03)
 
 
-def scored(directed=(0.1, 0.2), entropy=0.5, green=0.5, rough=0.5, independent=150.0):
-    return score_candidates(np.array([directed]), *np.array([[entropy], [green], [rough], [independent]]))
+def scored(directed=(0.1, 0.2), entropy=0.5, green=0.5, smooth=0.4, independent=150.0):
+    return score_candidates(np.array([directed]), *np.array([[entropy], [green], [smooth], [independent]]))
 
 
-def test_more_direction_and_less_entropy_green_and_roughness_raise_the_score():
-    for change in ({"directed": (0.3, 0.2)}, {"directed": (0.1, 0.4)}, {"entropy": 0}, {"green": 0}, {"rough": 0.2}):
+def test_more_direction_and_smoothness_and_less_entropy_and_green_raise_the_score():
+    for change in ({"directed": (0.3, 0.2)}, {"directed": (0.1, 0.4)}, {"entropy": 0}, {"green": 0}, {"smooth": 0.9}):
         better = scored(**change)
         assert better.score[0] > scored().score[0]
         assert better.buildings[0] == (better.score[0] > 0)
-    assert scored(rough=np.nan).score[0] == pytest.approx(scored(rough=0.35).score[0])
+    assert scored(smooth=np.nan).score[0] == pytest.approx(scored(smooth=0.5).score[0])
 
 
 def test_a_house_is_kept_and_a_crown_dropped_where_the_image_says_nothing():
-    assert scored(directed=(0.05, 0.1), entropy=0.2, green=0.2, rough=0.15).buildings[0]
-    assert not scored(directed=(0.05, 0.1), entropy=0.2, green=0.2, rough=0.9).buildings[0]
+    assert scored(directed=(0.05, 0.1), entropy=0.2, green=0.2, smooth=0.9).buildings[0]
+    assert not scored(directed=(0.05, 0.1), entropy=0.2, green=0.2, smooth=0.1).buildings[0]
 
 
 def test_the_gradient_of_interpolated_pixels_is_taken_at_their_own_scale():
