@@ -22,7 +22,17 @@ import shapely
 
 import roofbench as rb
 from roofbench.core.errors import MissingInputError
-from roofbench.detectors.mpp import bends, block_cells, mpp_detector, preparation, raised_walls, rows
+from roofbench.detectors.mpp import (
+    background,
+    bends,
+    block_cells,
+    image_cue,
+    mpp_detector,
+    preparation,
+    raised_walls,
+    rows,
+)
+from roofbench.detectors.shared import cue_information
 from roofbench.evaluators.threshold_free.causes import CAUSES, loss_by_cause
 from roofbench.scenes.geodata.vector_files import read_footprints
 
@@ -46,6 +56,14 @@ THRESHOLDS = {
     "standard deviations of a parapet": (raised_walls, "_BEYOND", 1000, (1.5, 2.0, 2.5, 3.0, 1000)),
     "least change of direction, degrees": (bends, "_LEAST", 90, (3, 5, 8, 90)),
 }  # fmt: skip
+
+#: Numbers that cells, their scores or boxes depend on.
+OF_PREPARATION = (
+    (preparation, "_LOW_SHARE"),
+    (background, "_WITHOUT_OPENNESS"),
+    (image_cue, "_WEIGHT"),
+    (cue_information, "_LEAST_SEPARATION"),
+)
 
 
 @dataclass(frozen=True)
@@ -154,14 +172,17 @@ def remembered():
 
     def keep(name, function, key):
         def wrapped(*arguments):
-            place = (name, *key(arguments), preparation._LOW_SHARE)
+            place = (name, *key(arguments), *(getattr(module, value) for module, value in OF_PREPARATION))
             if place not in results:
                 results[place] = function(*arguments)
             return results[place]
 
         return wrapped
 
-    prepared = keep("prepare", mpp_detector.prepare, lambda given: (given[2].extent, len(given[1])))
+    def cloud_of(given):
+        return given[2].extent, len(given[1]), float(given[1].z[:1000].sum())
+
+    prepared = keep("prepare", mpp_detector.prepare, lambda given: (*cloud_of(given), given[0]))
     searched = keep("find", mpp_detector.find_rectangles, lambda given: (id(given[1]), given[2]))
     with set_to(mpp_detector, "prepare", prepared), set_to(mpp_detector, "find_rectangles", searched):
         yield
@@ -206,7 +227,7 @@ def leave_one_out(options):
         for left_out in found[now]:
             # Of equal values the present one is kept.
             order = sorted(found, key=now.__ne__)
-            merits = [merit(found[value], left_out) for value in order]
+            merits = [merit(found[value], [left_out]) for value in order]
             best = order[int(np.argmax(merits))]
             chosen.append(best)
             held.append((found[best][left_out].object, found[best][left_out].pixel))
@@ -217,8 +238,8 @@ def leave_one_out(options):
 
 
 def merit(outcomes, left_out):
-    """Return the sum of both qualities over all scenes but one."""
-    return round(sum(o.object + o.pixel for scene, o in outcomes.items() if scene != left_out), 2)
+    """Return the sum of both qualities over all scenes but those left out."""
+    return round(sum(o.object + o.pixel for scene, o in outcomes.items() if scene not in left_out), 2)
 
 
 def pictures(options):
