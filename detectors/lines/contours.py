@@ -71,7 +71,7 @@ def _resample(
         n = last - first
         steps = n if closed else n - 1
         for k in range(steps):
-            here, there = points[first + k], points[first + (k + 1) % n]
+            here, there = points[first + k], points[first + k + 1 if k + 1 < n else first]
             distance[first + i + k + 1] = distance[first + i + k] + math.hypot(there[0] - here[0], there[1] - here[1])
         total = distance[first + i + steps]
         counts[i + 1] = max(2, round(total / spacing)) + (0 if closed else 1)
@@ -92,7 +92,7 @@ def _resample(
                 k += 1
             start, end = distance[first + i + k], distance[first + i + k + 1]
             share = (at - start) / (end - start) if end > start else 0.0
-            here, there = points[first + k], points[first + (k + 1) % n]
+            here, there = points[first + k], points[first + k + 1 if k + 1 < n else first]
             out[out_offsets[i] + j, 0] = here[0] + share * (there[0] - here[0])
             out[out_offsets[i] + j, 1] = here[1] + share * (there[1] - here[1])
     return out, out_offsets
@@ -129,19 +129,19 @@ def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float, sampl
     lies across (see `boxes`), for outer and inner outlines alike.
     """
     found, hierarchy = cv2.findContours(black, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    polylines: list[NDArray[np.int32]] = []
-    shapes: list[int] = []
-    least = shortest / gsd / math.sqrt(2)
-    parents = [] if hierarchy is None else hierarchy[0, :, 3].tolist()
-    for index, contour in enumerate(found):
-        # A step is a pixel or a diagonal long.
-        if len(contour) >= least and (len(contour) * gsd >= shortest or cv2.arcLength(contour, True) * gsd >= shortest):
-            polylines.append(contour)
-            shapes.append(index if parents[index] < 0 else parents[index])
-    offsets = np.cumsum([0, *map(len, polylines)], dtype=np.int64)
+    parents = np.empty(0, dtype=np.int32) if hierarchy is None else hierarchy[0, :, 3]
+    # A step is a pixel or a diagonal long.
+    sizes = np.fromiter(map(len, found), dtype=np.int64, count=len(found))
+    long = sizes * gsd >= shortest
+    for index in np.flatnonzero(~long & (sizes * gsd * math.sqrt(2) >= shortest)).tolist():
+        long[index] = cv2.arcLength(found[index], True) * gsd >= shortest
+    kept = np.flatnonzero(long)
+    offsets = np.concatenate([[0], np.cumsum(sizes[kept])])
+    shapes = np.where(parents[kept] < 0, kept, parents[kept])
     # Each outline is reversed: all of them are, and so is their order before.
-    points = np.concatenate([*polylines[::-1], np.empty((0, 1, 2), dtype=np.int32)])[::-1, 0] + 0.5
-    return sample_curves(points, offsets, np.array(shapes, dtype=np.int64), closed=True, spacing=sample / gsd)
+    polylines = [found[index] for index in kept[::-1].tolist()]
+    points = np.concatenate([*polylines, np.empty((0, 1, 2), dtype=np.int32)])[::-1, 0] + 0.5
+    return sample_curves(points, offsets, shapes.astype(np.int64), closed=True, spacing=sample / gsd)
 
 
 @kernel

@@ -42,7 +42,7 @@ def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -
     starts = n if closed else max(n - chord, 0)
     dx, dy, norm = np.zeros(starts), np.zeros(starts), np.ones(starts)
     for start in range(starts):
-        end = (start + chord) % n
+        end = start + chord if start + chord < n else start + chord - n
         across, down = x[end] - x[start], y[end] - y[start]
         length = math.hypot(across, down)
         if length >= 1e-9:

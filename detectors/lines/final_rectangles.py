@@ -102,17 +102,31 @@ def lies_inside(inner: NDArray[np.float64], outer: NDArray[np.float64]) -> bool:
 
 
 @kernel
-def strip_shares(
-    colours: Colours,
-    primary: NDArray[np.uint8],
-    secondary: NDArray[np.uint8],
-    within: NDArray[np.bool_],
-    strip: NDArray[np.float64],
-) -> tuple[float, float, float]:
-    """Return the least share in range over Y, I and Q, and the shares black in the primary and the secondary mask."""
+def black_shares(
+    primary: NDArray[np.uint8], secondary: NDArray[np.uint8], strip: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Return the shares of a strip that are black in the primary and in the secondary mask."""
     rows, columns = primary.shape
     across, down = max(1, round(strip[U1] - strip[U0])), max(1, round(strip[V1] - strip[V0]))
-    of_y, of_i, of_q, black, filled = 0, 0, 0, 0, 0
+    black, filled = 0, 0
+    for i in range(across):
+        u = strip[U0] + np.divide((i + 0.5) * (strip[U1] - strip[U0]), across)  # without a test for zero
+        for j in range(down):
+            v = strip[V0] + np.divide((j + 0.5) * (strip[V1] - strip[V0]), down)
+            column = math.floor(strip[OX] + u * strip[UX] - v * strip[UY])
+            row = math.floor(strip[OY] + u * strip[UY] + v * strip[UX])
+            if 0 <= row < rows and 0 <= column < columns:
+                black += primary[np.uintp(row), np.uintp(column)]
+                filled += secondary[np.uintp(row), np.uintp(column)]
+    return black / (across * down), filled / (across * down)
+
+
+@kernel
+def colour_share(colours: Colours, within: NDArray[np.bool_], strip: NDArray[np.float64]) -> float:
+    """Return the least share of a strip in range over Y, I and Q."""
+    rows, columns = colours.values.shape[1:]
+    across, down = max(1, round(strip[U1] - strip[U0])), max(1, round(strip[V1] - strip[V0]))
+    of_y, of_i, of_q = 0, 0, 0
     for i in range(across):
         u = strip[U0] + np.divide((i + 0.5) * (strip[U1] - strip[U0]), across)  # without a test for zero
         for j in range(down):
@@ -121,14 +135,11 @@ def strip_shares(
             row = math.floor(strip[OY] + u * strip[UY] + v * strip[UX])
             if not (0 <= row < rows and 0 <= column < columns):
                 continue
-            black += primary[row, column]
-            filled += secondary[row, column]
             y_bin, i_bin, q_bin = yiq_bins(colours, row, column)
             of_y += within[0, np.uintp(y_bin)]
             of_i += within[1, np.uintp(i_bin)]
             of_q += within[2, np.uintp(q_bin)]
-    samples = across * down
-    return min(of_y, of_i, of_q) / samples, black / samples, filled / samples
+    return float(min(of_y, of_i, of_q) / (across * down))
 
 
 @kernel
@@ -149,12 +160,13 @@ def extended_final_side(
     while width >= rules.least_strip:
         end = reached + outwards * width
         strip[side], strip[opposite] = end, reached
-        in_range, black, filled = strip_shares(colours, primary, secondary, within, strip)
+        black, filled = black_shares(primary, secondary, strip)
         rises = black > before + rules.rise
         gap = gap or before < rules.gap_share if rules.rises_after_gap else before < rules.gap_share
         if rises and gap:
             break
-        if in_range > rules.colour_share and filled > rules.black_share and (rules.rises_after_gap or not rises):
+        solid = filled > rules.black_share and (rules.rises_after_gap or not rises)
+        if solid and colour_share(colours, within, strip) > rules.colour_share:
             reached, before = end, black
         else:
             width /= 2

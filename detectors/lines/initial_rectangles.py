@@ -47,15 +47,15 @@ class InitialRules(NamedTuple):
 @kernel
 def share_inside(line: NDArray[np.float64], box: NDArray[np.float64], margin: float) -> float:
     """Return the share of a line's length that lies in a box widened by `margin`; 0 when its midpoint does not."""
+    middle = (line[U0] + line[U1]) / 2
+    u, v = to_box(line[OX] + middle * line[UX], line[OY] + middle * line[UY], box)
+    if not (box[U0] - margin <= u <= box[U1] + margin and box[V0] - margin <= v <= box[V1] + margin):
+        return 0.0
     wide = box.copy()
     wide[U0] -= margin
     wide[U1] += margin
     wide[V0] -= margin
     wide[V1] += margin
-    middle = (line[U0] + line[U1]) / 2
-    u, v = to_box(line[OX] + middle * line[UX], line[OY] + middle * line[UY], wide)
-    if not (wide[U0] <= u <= wide[U1] and wide[V0] <= v <= wide[V1]):
-        return 0.0
     return float(length_inside(line, wide) / (line[U1] - line[U0]))
 
 

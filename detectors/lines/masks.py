@@ -38,6 +38,7 @@ from ...core.kernels import kernel
 from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
+from .nearest_points import nearest_kind
 
 __all__ = ["Masks", "build_cell_masks", "build_masks", "ground_correction", "ground_heights", "pulse_spacing"]
 
@@ -49,8 +50,6 @@ _WIDEST_VOID = 50.0
 _CORRECTION_CELL = 4.0
 #: A void farther than this many neighbourhoods from any high point is no roof: water and wet asphalt give no returns.
 _BARE = 4.0
-#: Rows of the masks that are computed at a time: distances take eight times the memory of a mask.
-_BAND = 512
 #: Distance between successive bins of the height histogram of a tile (conference version), metres.
 _HEIGHT_BIN = 2.0
 #: Side of the cells of masks that do not follow the image, metres.
@@ -98,11 +97,11 @@ def pulse_spacing(points: PointCloud, grid: Grid) -> float:
     The square root of the area per first return in the median occupied cell; every point counts as a pulse when the
     cloud has no return numbers or no first returns.
     """
-    x, y = points.x, points.y
-    if points.return_number is not None and (first := points.return_number == 1).any():
-        x, y = x[first], y[first]
+    first = None if points.return_number is None else points.return_number == 1
+    if first is not None and not first.any():
+        first = None
     cell = 2 * _COVERAGE_CELL
-    counts = point_counts(x, y, Grid.covering(grid.extent, cell))
+    counts = point_counts(points.x, points.y, Grid.covering(grid.extent, cell), among=first)
     return spacing_of_counts(counts, cell, "median") or cell
 
 
@@ -179,13 +178,16 @@ def ground_correction(points: PointCloud, ground: NDArray[np.float64], share: fl
     """
     above = points.z - ground
     known = np.isfinite(above)
-    if not known.any():
+    x, y = points.x, points.y
+    if not known.all():
+        x, y, above = x[known], y[known], above[known]
+    below = np.flatnonzero(above < 0)
+    if not len(below):
         return np.zeros(len(points))
-    x, y = (points.x, points.y) if known.all() else (points.x[known], points.y[known])
     grid = Grid.covering((x.min() - _CORRECTION_CELL, y.min() - _CORRECTION_CELL, x.max(), y.max()), _CORRECTION_CELL)
     cell = grid.cells(x, y)[0]
     allowed = np.floor(share * np.bincount(cell, minlength=grid.rows * grid.columns)).astype(np.int64)
-    low = _lowest(above[known].astype(np.float32), cell, allowed)
+    low = _lowest(above[below].astype(np.float32), cell[below], allowed)
     lowest = cv2.erode(low.reshape(grid.shape), np.ones((3, 3), np.uint8))
     return Elevation(lowest, grid).sample(points.x, points.y)
 
@@ -223,28 +225,6 @@ def _squares(hits: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
     return np.asarray(cv2.dilate(hits, np.ones((side, side), np.uint8)), dtype=np.uint8)
 
 
-def _nearest(
-    low: NDArray[np.uint8], high: NDArray[np.uint8], reach: float
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return where the nearest point is low and where it is high, up to `reach` pixels away; a tie is low.
-
-    Where the nearest high point is farther than `_BARE` times that, the place is low at any distance. Distances are
-    those of cv2's 5 x 5 chamfer mask, within 2 % of the exact ones.
-    """
-    is_low, is_high = np.empty_like(low), np.empty_like(high)
-    halo = math.ceil(_BARE * reach) + 1
-    for top in range(0, len(low), _BAND):
-        first, bottom = max(top - halo, 0), min(top + _BAND, len(low))
-        part = slice(first, bottom + halo)
-        to_low, to_high = (
-            cv2.distanceTransform(1 - hits[part], cv2.DIST_L2, cv2.DIST_MASK_5)[top - first : bottom - first]
-            for hits in (low, high)
-        )
-        is_low[top:bottom] = ((to_low <= to_high) & (to_low <= reach)) | (to_high > _BARE * reach)
-        is_high[top:bottom] = (to_high < to_low) & (to_high <= reach)
-    return is_low, is_high
-
-
 def build_masks(
     points: PointCloud,
     thresholds: NDArray[np.float64],
@@ -274,7 +254,8 @@ def build_masks(
     low, high = _hits(points, thresholds, grid)
     secondary = _squares(high, side)
     if nearest:
-        primary, filled = _nearest(low, high, neighbourhood / grid.gsd)
+        reach = neighbourhood / grid.gsd
+        primary, filled = nearest_kind(low, high, reach, _BARE * reach)
         secondary |= filled
     else:
         primary = _squares(low, side)

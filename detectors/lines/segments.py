@@ -60,23 +60,26 @@ def fit_line(points: NDArray[np.float64], raw: NDArray[np.float64], first: int, 
         Index of the first point of the piece, and its number of points; indices wrap around.
     """
     n = len(points)
+    start = first % n
     mx = my = 0.0
-    for k in range(count):
-        at = (first + k) % n
+    at = start
+    for _ in range(count):
         mx += points[at, 0]
         my += points[at, 1]
+        at = at + 1 if at + 1 < n else 0
     mx /= count
     my /= count
     xx = xy = yy = 0.0
-    for k in range(count):
-        at = (first + k) % n
+    at = start
+    for _ in range(count):
         dx, dy = points[at, 0] - mx, points[at, 1] - my
         xx += dx * dx
         xy += dx * dy
         yy += dy * dy
+        at = at + 1 if at + 1 < n else 0
     angle = 0.5 * math.atan2(2 * xy, xx - yy)
     ux, uy = math.cos(angle), math.sin(angle)
-    a, b = first % n, (first + count - 1) % n
+    a, b = start, (first + count - 1) % n
     t0 = (raw[a, 0] - mx) * ux + (raw[a, 1] - my) * uy
     t1 = (raw[b, 0] - mx) * ux + (raw[b, 1] - my) * uy
     if t1 < t0:
@@ -95,13 +98,14 @@ def _deviation(points: NDArray[np.float64], first: int, count: int, line: NDArra
     total, farthest, most = 0.0, 0, -1.0
     a, b = first % n, (first + count - 1) % n
     dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    at = a
     for k in range(count):
-        at = (first + k) % n
         off = (points[at, 1] - line[OY]) * line[UX] - (points[at, 0] - line[OX]) * line[UY]
         total += off * off
         aside = abs((points[at, 1] - points[a, 1]) * dx - (points[at, 0] - points[a, 0]) * dy)
         if aside > most:
             farthest, most = k, aside
+        at = at + 1 if at + 1 < n else 0
     return math.sqrt(total / count), farthest
 
 

@@ -34,13 +34,17 @@ def _index_prefix(plus: NDArray[Any], minus: NDArray[Any], factor: int) -> NDArr
     rows, columns = plus.shape
     prefix = np.empty((rows, columns + 1), dtype=np.int32)
     for row in range(rows):
+        index = prefix[row, 1:]
+        for column in range(columns):
+            high, low = np.float64(plus[row, column]), np.float64(minus[row, column])
+            # Whole numbers this small are divided exactly enough, and without a test for zero, to be rounded down.
+            rounded = np.divide(510.0 * factor * (high - low) + high + low, max(2.0 * (high + low), 1.0))
+            index[column] = np.int32(min(rounded, 255.0)) if high > low else np.int32(0)
         total = 0
         prefix[row, 0] = 0
         for column in range(columns):
-            high, low = int(plus[row, column]), int(minus[row, column])
-            if high > low:
-                total += min((510 * factor * (high - low) + high + low) // (2 * (high + low)), 255)
-            prefix[row, column + 1] = total
+            total += index[column]
+            index[column] = total
     return prefix
 
 

@@ -34,6 +34,8 @@ _Coordinates = NDArray[np.float64]
 #: holes (a scanned cloud has hundreds). Fewest points by which a lattice is recognised.
 _TESTED, _NODES_PER_POINT, _FEWEST_NODES = 16.0, 4, 50
 
+#: Stands for a choice of all points.
+_ALL = np.empty(0, dtype=np.bool_)
 #: How the squares are summarised: the *mean* of all covered ones; their *median*, which overlapping flight strips and
 #: half covered borders do not affect; or the square of the *median-point*, for points that cover little, as roofs do.
 Statistic = Literal["mean", "median", "median-point"]
@@ -66,10 +68,15 @@ def point_spacing(
     return spacing_of_counts(point_counts(x, y, grid), square, statistic)
 
 
-def point_counts(x: _Coordinates, y: _Coordinates, grid: Grid) -> NDArray[np.int64]:
-    """Return the number of points in each cell of a grid, shape (rows, columns); points not finite lie in none."""
+def point_counts(
+    x: _Coordinates, y: _Coordinates, grid: Grid, *, among: NDArray[np.bool_] | None = None
+) -> NDArray[np.int64]:
+    """Return the number of points in each cell of a grid, shape (rows, columns); points not finite lie in none.
+
+    With `among`, shape (n,), only the points where it is true count.
+    """
     counts = np.zeros(grid.shape, dtype=np.int64)
-    _count(x, y, grid.frame, counts)
+    _count(x, y, _ALL if among is None else among, grid.frame, counts)
     return counts
 
 
@@ -107,9 +114,11 @@ def is_lattice(x: _Coordinates, y: _Coordinates) -> bool:
 
 
 @kernel
-def _count(x: _Coordinates, y: _Coordinates, frame: Frame, counts: NDArray[np.int64]) -> None:
-    """Add the points to the counts of their squares, shape (rows, columns), in place."""
+def _count(x: _Coordinates, y: _Coordinates, among: NDArray[np.bool_], frame: Frame, counts: NDArray[np.int64]) -> None:
+    """Add the points, or those of `among` unless it is empty, to the counts of their squares, in place."""
     for i in range(len(x)):
+        if len(among) > 0 and not among[i]:
+            continue
         column, row = (x[i] - frame.west) / frame.gsd, (frame.north - y[i]) / frame.gsd
         if 0 <= column < frame.columns and 0 <= row < frame.rows:
             counts[int(row), int(column)] += 1

@@ -19,10 +19,12 @@ def bilinear_at(values: NDArray[np.float32], west: float, north: float, cell: fl
     row = min(max((north - y) / cell - 0.5, 0.0), rows - 1.0)
     column = min(max((x - west) / cell - 0.5, 0.0), columns - 1.0)
     top, left = min(int(row), max(rows - 2, 0)), min(int(column), max(columns - 2, 0))
-    bottom, right = min(top + 1, rows - 1), min(left + 1, columns - 1)
     down, across = row - top, column - left
-    upper = values[top, left] * (1 - across) + values[top, right] * across
-    lower = values[bottom, left] * (1 - across) + values[bottom, right] * across
+    # Unsigned, so that indices are not tested for counting from the end.
+    bottom, right = np.uintp(min(top + 1, rows - 1)), np.uintp(min(left + 1, columns - 1))
+    upmost, leftmost = np.uintp(top), np.uintp(left)
+    upper = values[upmost, leftmost] * (1 - across) + values[upmost, right] * across
+    lower = values[bottom, leftmost] * (1 - across) + values[bottom, right] * across
     return float(upper * (1 - down) + lower * down)
 
 

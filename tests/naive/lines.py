@@ -143,3 +143,28 @@ def widest_new_square(box: np.ndarray, others: np.ndarray, widths: np.ndarray, s
         ):
             widest = width
     return widest
+
+
+def chamfer_distance(points):
+    """Return the distance of each pixel from the nearest point: steps are tried until none shortens any."""
+    weights = {1: 1024, 2: 1434, 5: 2250}  # by squared length of the step, in parts of 1024 of a pixel
+    rows, columns = points.shape
+    distance = np.where(points, 0, 1 << 40)
+    while True:
+        padded = np.pad(distance, 2, constant_values=1 << 40)
+        shorter = distance
+        for down in range(-2, 3):
+            for right in range(-2, 3):
+                weight = weights.get(down * down + right * right)
+                if weight is not None:
+                    moved = padded[2 + down : 2 + down + rows, 2 + right : 2 + right + columns] + weight
+                    shorter = np.minimum(shorter, moved)
+        if np.array_equal(shorter, distance):
+            return distance / 1024
+        distance = shorter
+
+
+def nearest_kind(low, high, reach, bare):
+    """Return where the nearest point is low, or no high one is near, and where it is high."""
+    to_low, to_high = chamfer_distance(low), chamfer_distance(high)
+    return ((to_low <= to_high) & (to_low <= reach)) | (to_high > bare), (to_high < to_low) & (to_high <= reach)

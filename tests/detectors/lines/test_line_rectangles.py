@@ -11,10 +11,11 @@ from roofbench.detectors.lines.duplicates import DuplicateRules, adds_width, fin
 from roofbench.detectors.lines.extension import Cover, Growth, extend_lines, extend_rectangle
 from roofbench.detectors.lines.final_rectangles import (
     FinalRules,
+    black_shares,
+    colour_share,
     extended_final_side,
     lies_inside,
     shrink,
-    strip_shares,
 )
 from roofbench.detectors.lines.initial_rectangles import (
     INSIDE,
@@ -303,14 +304,16 @@ def test_shares_of_an_axis_parallel_strip_are_those_of_its_pixels():
     black[:30] = 1
     strip = np.array([50.0, 20.0, 0.0, 1.0, 0.0, 20.0, -20.0, 10.0])
     within = dominant_ranges(colours, np.array([30.0, 30.0, 1.0, 0.0, -9.0, 9.0, -9.0, 9.0]), 0.97, 0.9)
-    assert strip_shares(colours, black, 1 - black, within, strip) == pytest.approx((20 / 30, 0.5, 0.5))
+    assert black_shares(black, 1 - black, strip) == pytest.approx((0.5, 0.5))
+    assert colour_share(colours, within, strip) == pytest.approx(20 / 30)
 
 
 def test_a_strip_thinner_than_a_pixel_is_sampled_once_across():
     colours, black = two_coloured(), np.ones((60, 100), np.uint8)
     strip = np.array([30.0, 20.5, 1.0, 0.0, 0.0, 10.0, 0.0, 0.3])
     within = np.ones((3, 20), dtype=bool)
-    assert strip_shares(colours, black, black, within, strip) == (1, 1, 1)
+    assert black_shares(black, black, strip) == (1, 1)
+    assert colour_share(colours, within, strip) == 1
 
 
 def test_directions_are_unit_vectors_after_all_steps():
