@@ -16,12 +16,13 @@ from ...core.kernels import kernel
 
 __all__ = ["nearest_kind"]
 
-#: Parts of a pixel that distances are counted in, and the weights of the mask.
-_PARTS = 1024
+#: Parts of a pixel that distances are counted in; all weights are whole numbers of them, so that ties are exact.
+_PARTS = 10000
+#: Weights of the mask.
 _SIDE, _DIAGONAL, _KNIGHT = (np.float32(round(_PARTS * weight)) for weight in (1.0, 1.4, 2.1969))
 #: Pixels: a distance that is farther than any that is asked for, and columns whose distances are spread along a row at
 #: a time: float32 has 24 bits for whole numbers.
-_FARTHEST, _COLUMNS = 8192, 4096
+_FARTHEST, _COLUMNS = 1200, 400
 _FAR = np.float32(_PARTS * _FARTHEST)
 #: Rows that are computed at a time: distances take eight times the memory of a mask.
 _BAND = 512
