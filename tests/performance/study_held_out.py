@@ -11,9 +11,10 @@ rasters
     nearest cell: what ``roofbench scenes import --dsm`` makes of a surface model. Without images.
 images
     Folders with an image in colours, as first returns without numbers and as rasters, and presets whose points record
-    no number of returns (``level=part``, as their references have a rectangle for each wing).
+    no number of returns (``level=part``, as their references have a rectangle for each wing). The first scene of each
+    place also with its image turned by 180 degrees, which says nothing about the points.
 walls
-    The presets `rows` and `old-town`, and the folders whose name begins with delft.
+    The presets `rows` and `old-town`, `toronto-a` for its deep roofs (``level=part``), and the folders of Delft.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ from roofbench.scenes.geodata.raster import Grid
 #: Metres: cells of rasters, and of those of points that are farther apart than the first.
 FINE, COARSE = 0.5, 1.0
 #: Presets whose references have a rectangle for each wing.
-OF_PARTS = ("knox", "moonee-ponds")
+OF_PARTS = ("knox", "moonee-ponds", "toronto-a")
+#: Presets of the studies of images and of walls.
+PRESETS = {"images": ("knox", "moonee-ponds"), "walls": ("rows", "old-town", "toronto-a")}
 
 
 class Threshold(NamedTuple):
@@ -144,9 +147,19 @@ def scenes_of(study, folders, seeds):
         coloured = {name: scene for name, scene in places.items() if scene.image is not None and scene.image.is_colour}
         found |= {f"{name} first returns": first_returns(scene) for name, scene in coloured.items()}
         found |= {f"{name} raster": rastered(scene, scene.image) for name, scene in coloured.items()}
-    for preset in ("rows", "old-town") if study == "walls" else OF_PARTS:
+    for preset in PRESETS[study]:
         found |= {f"{preset} {seed}": rb.make_scene(preset, seed=seed) for seed in range(1, seeds + 1)}
+    if study == "images":
+        first = {place_of(name): name for name in reversed(found)}
+        found |= {f"{name} turned": with_turned_image(found[name]) for name in first.values()}
     return found
+
+
+def with_turned_image(scene):
+    image = scene.image
+    valid = None if image.valid is None else image.valid[::-1, ::-1]
+    turned = replace(image, values=np.ascontiguousarray(image.values[:, ::-1, ::-1]), valid=valid)
+    return with_points(scene, scene.points, turned)
 
 
 def place_of(name):

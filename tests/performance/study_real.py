@@ -32,6 +32,7 @@ from roofbench.detectors.mpp import (
     raised_walls,
     rows,
 )
+from roofbench.detectors.registry import make_detector
 from roofbench.detectors.shared import cue_information
 from roofbench.evaluators.threshold_free.causes import CAUSES, loss_by_cause
 from roofbench.scenes.geodata.vector_files import read_footprints
@@ -119,7 +120,7 @@ def agreement(found, scene):
 
 
 def run(detector, scenes, seeds):
-    """Return the mean over seeds for each scene on which the detector runs.
+    """Return the mean over seeds, one if it draws no random number, for each scene on which the detector runs.
 
     A folder (a name with a slash) in place of a detector holds footprints of another version, SCENE-SEED.gpkg.
     """
@@ -129,7 +130,8 @@ def run(detector, scenes, seeds):
             if "/" in detector:
                 sets = [read_footprints(file) for file in sorted(Path(detector).glob(f"{name}-[0-9].gpkg"))]
             else:
-                sets = [rb.detect(scene, detector, seed=seed) for seed in range(seeds)]
+                many = seeds if make_detector(detector).stochastic else 1
+                sets = [rb.detect(scene, detector, seed=seed) for seed in range(many)]
             outcomes = [scored(footprints, scene).numbers for footprints in sets]
         except MissingInputError as error:
             print(f"<!-- {detector} on {name}: {error} -->")
