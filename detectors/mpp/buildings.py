@@ -53,7 +53,12 @@ def block_of(outlines: NDArray[np.object_], blocks: NDArray[np.object_]) -> NDAr
 
 
 def outline_buildings(
-    rectangles: NDArray[np.float64], blocks: NDArray[np.object_], grid: Grid, *, always: bool = False
+    rectangles: NDArray[np.float64],
+    blocks: NDArray[np.object_],
+    grid: Grid,
+    *,
+    always: bool = False,
+    wanted: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.object_]:
     """Return one outline a rectangle, shape (n,), polygons or multipolygons in metres of the CRS.
 
@@ -66,6 +71,8 @@ def outline_buildings(
     grid : Grid
     always : bool
         Follow the cells even where the rectangle is as good an outline, so that the outlines cover their blocks.
+    wanted : ndarray of bool, shape (n,), optional
+        Which outlines are wanted: all of a block or none. The others are rectangles, which no other outline avoids.
     """
     outlines: NDArray[np.object_] = shapely.polygons(to_world(rectangles, grid))
     if len(rectangles) == 0 or len(blocks) == 0:
@@ -75,7 +82,8 @@ def outline_buildings(
     result = outlines.copy()
     alone = np.bincount(block[block >= 0], minlength=len(blocks)) == 1
     places = corners(rectangles)
-    inside = np.flatnonzero(block >= 0)
+    asked = np.ones(len(rectangles), dtype=np.bool_) if wanted is None else wanted
+    inside = np.flatnonzero((block >= 0) & asked)
     parts = blocks[block[inside]]
     for row in np.flatnonzero(~alone[block[inside]]).tolist():
         k = int(inside[row])
@@ -89,7 +97,7 @@ def outline_buildings(
     drawn = np.zeros(len(rectangles), dtype=np.bool_)
     drawn[inside[follows]] = True
     for k in np.flatnonzero(drawn).tolist():
-        rivals = near[k][(near[k] != k) & (~drawn[near[k]] | (near[k] < k))]
+        rivals = near[k][(near[k] != k) & asked[near[k]] & (~drawn[near[k]] | (near[k] < k))]
         rivals = rivals[shapely.intersects(result[rivals], result[k])]
         rest = _whole(shapely.difference(result[k], shapely.union_all(result[rivals]), grid_size=_FINEST))
         result[k] = outlines[k] if rest.is_empty else rest

@@ -130,7 +130,8 @@ def find_levels(
     most_of_block = np.zeros(len(blocks), dtype=np.int64)
     np.maximum.at(most_of_block, block[inside], certain[inside])
     row = _are_rows(blocks, walls_of_block) & (most_of_block >= _REPEATED)
-    outlines = outline_buildings(rectangles, blocks, grid)
+    # Rows are divided by themselves below.
+    outlines = outline_buildings(rectangles, blocks, grid, wanted=~np.append(row, False)[block])
     parts: list[Any] = []
     rectangle_of: list[int] = []
     building_of: list[int] = []

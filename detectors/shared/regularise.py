@@ -112,8 +112,10 @@ def _regular(traced: Any, simple: Any, tolerance: float, angle: float, reach: fl
 
 def _rings(polygon: Any) -> list[_Points]:
     """Return the places of each ring, the exterior one first, each place once."""
-    places, ring = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
-    ends = np.flatnonzero(np.diff(ring, append=-1)) + 1
+    places = shapely.get_coordinates(polygon)
+    if shapely.get_num_interior_rings(polygon) == 0:
+        return [places[:-1]]
+    ends = np.cumsum(shapely.get_num_coordinates(shapely.get_rings(polygon)))
     return [places[first : end - 1] for first, end in itertools.pairwise([0, *ends.tolist()])]
 
 
@@ -152,7 +154,7 @@ def _fit_walls(corners: _Points, sources: list[_Points]) -> _Points | None:
             break
     else:
         return None
-    if (np.diff(position, append=position[0]) % len(ring)).sum() != len(ring):
+    if ((np.concatenate([position[1:], position[:1]]) - position) % len(ring)).sum() != len(ring):
         # The simplified ring runs the other way round.
         ring = ring[::-1]
         position = len(ring) - 1 - position
@@ -166,14 +168,15 @@ def _fit_walls(corners: _Points, sources: list[_Points]) -> _Points | None:
     middle = ring + step / 2
     total = np.maximum(np.add.reduceat(length, start), 1e-12)
     centre = np.add.reduceat(middle * length[:, None], start) / total[:, None]
-    wall = np.repeat(np.arange(len(start)), np.diff([*start, len(ring)]))
+    steps = np.append(start[1:], len(ring)) - start
+    wall = np.repeat(np.arange(len(start)), steps)
     x, y = (middle - centre[wall]).T
     xx, xy, yy = (np.add.reduceat(length * product, start) for product in (x * x, x * y, y * y))
     across = np.roll(corners, -1, axis=0) - corners
     chord = np.arctan2(across[:, 1], across[:, 0])
     fitted = np.arctan2(2 * xy, xx - yy) / 2
     fitted += np.pi * np.round((chord - fitted) / np.pi)
-    few = np.bincount(wall) < 4
+    few = steps < 4
     direction = np.where(few, chord, fitted)
     centre[few] = (corners + across / 2)[few]
     return np.column_stack([centre, direction, np.hypot(across[:, 0], across[:, 1])])
@@ -202,7 +205,8 @@ def _main_directions(walls: _Points) -> _Points:
         if support[best] <= 0 or support[best] < least:
             break
         followers = near[:, best]
-        mains.append(degrees[best] + np.average(away[followers, best], weights=remaining[followers]))
+        weights = remaining[followers]
+        mains.append(degrees[best] + (away[followers, best] * weights).sum() / weights.sum())
         remaining[np.abs(away[:, best]) < 2 * _SAME_DIRECTION] = 0
     return np.radians(mains) % (math.pi / 2)
 

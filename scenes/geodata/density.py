@@ -105,7 +105,8 @@ def is_lattice(x: _Coordinates, y: _Coordinates) -> bool:
     if not len(x):
         return False
     middle = len(x) // 2
-    near = (np.abs(x - x[middle]) < _TESTED) & (np.abs(y - y[middle]) < _TESTED)
+    east, north = float(x[middle]), float(y[middle])
+    near = (x > east - _TESTED) & (x < east + _TESTED) & (y > north - _TESTED) & (y < north + _TESTED)
     x, y = x[near], y[near]
     nodes = len(np.unique(x)) * len(np.unique(y))
     if len(x) < max(_FEWEST_NODES, nodes / _NODES_PER_POINT):

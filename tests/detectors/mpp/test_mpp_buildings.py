@@ -82,3 +82,14 @@ def test_a_zone_is_cut_off_beyond_its_block_without_a_trace():
     first, second = outline_buildings(rectangles, np.array([block]), GRID, always=True)
     assert first.union(second).symmetric_difference(block).area < 0.1
     assert first.area == pytest.approx(world((20, 20, 45, 40), (40, 20, 44, 50)).area, abs=0.2)
+
+
+def test_outlines_that_are_not_wanted_are_rectangles_and_change_no_other():
+    rectangles = np.array([[30.0, 30.0, 20.0, 20.0, 0.0], [52.0, 30.0, 20.0, 20.0, 0.0], [85.0, 30.0, 20.0, 20.0, 0.0]])
+    blocks = np.array([world((20, 20, 64, 44)), world((75, 20, 95, 46))])
+    every = outline_buildings(rectangles, blocks, GRID)
+    some = outline_buildings(rectangles, blocks, GRID, wanted=np.array([True, True, False]))
+    assert some[0].equals(every[0])
+    assert some[1].equals(every[1])
+    assert not every[2].equals(some[2])
+    assert some[2].equals(world((75, 20, 95, 40)))
