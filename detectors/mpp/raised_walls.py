@@ -90,10 +90,10 @@ def parapet_strength(rise: Floats, share: float, least: float) -> Floats:
     middle = line_medians(both)
     usual = float(np.median(middle[enough]))
     spread = 1.4826 * float(np.median(np.abs(middle[enough] - usual)))
-    agree = (known & (both > usual + _NOISE)).sum(axis=1) >= share * known.sum(axis=1)
     beyond = middle - usual
-    raised = enough & agree & (beyond >= max(least, _BEYOND * spread))
-    strength[raised] = beyond[raised]
+    for station in np.flatnonzero(enough & (beyond >= max(least, _BEYOND * spread))).tolist():
+        if (both[station] > usual + _NOISE).sum() >= share * known[station].sum():
+            strength[station] = beyond[station]
     return strength
 
 
@@ -107,6 +107,8 @@ def chimneys(rise: Floats) -> Floats:
     """
     from scipy import ndimage
 
+    if not (rise >= _CHIMNEY).any():
+        return np.empty(0)
     stack = np.isfinite(rise) & (rise > _STACK)
     stack &= ~_long_runs(stack, _WIDE + 1)
     labels, _ = ndimage.label(stack, structure=np.ones((3, 3)))
