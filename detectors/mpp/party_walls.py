@@ -63,9 +63,9 @@ _DEEPEST = 16.0
 #: Share of the least colour edge that is noise, share of the lines that must have colours, and metres of a step that a
 #: difference of 1 counts like.
 _COLOUR_NOISE, _KNOWN_COLOUR, _COLOUR_METRES = 0.5, 0.5, 20.0
-#: Metres of a step that a chimney counts like, and least rise of a pitched roof from eaves to ridge: vents of flat
-#: roofs stand anywhere, and their ducts and sections rise in lines.
-_CHIMNEY_METRES, _PITCHED = 0.3, 1.0
+#: Metres of a step that a chimney counts like; least rise of a pitched roof from eaves to ridge, m, and tangent of 15
+#: degrees over half its depth: vents of flatter roofs stand anywhere, and their ducts and sections rise in lines.
+_CHIMNEY_METRES, _PITCHED, _PITCH = 0.3, 1.0, 0.27
 #: Metres: height differences that are noise, for steps and for valleys.
 _STEP_NOISE, _VALLEY_NOISE = 0.12, 0.25
 #: Share of the lines that must have heights for a step, and for a valley.
@@ -238,7 +238,7 @@ def raised_strength(roof: Floats, profile: Floats, rule: WallRule) -> Floats:
     strength = parapet_strength(rise[:, 1:-1], rule.parapet_share, rule.parapet)
     section = line_medians(roof[:, 1:-1].T, np.nan)
     section = section[np.isfinite(section)]
-    if len(section) == 0 or np.ptp(section) < _PITCHED:
+    if len(section) == 0 or np.ptp(section) < max(_PITCHED, _PITCH * _LATTICE * lines / 2):
         return repeated(strength)
     found = chimneys(rise)
     for station in found if rule.single else series(found):

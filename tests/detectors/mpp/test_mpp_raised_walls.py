@@ -25,6 +25,10 @@ def ridge(x, y):
     return 9.0 - 0.7 * np.abs(y - 15)
 
 
+def low(x, y):
+    return 9.0 - 0.22 * np.abs(y - 15)
+
+
 def flat(x, y):
     return 7.0 + 0 * x
 
@@ -95,9 +99,22 @@ def test_chimneys_that_repeat_are_party_walls():
         (ridge, [(17, 11, 39, 14, 0.12)]),
         (ridge, [chimney(x, 10.25, size=0.5) for x in WALLS]),
         (flat, [chimney(x) for x in WALLS]),
+        (low, [chimney(x) for x in WALLS]),
         (flat, [(x, 10, x + 0.5, 20, 0.5) for x in (20, 35)]),
     ],
-    ids=["plain", "one", "two", "too close", "dormers", "panels", "long panels", "eaves", "flat: vents", "flat: edges"],
+    ids=[
+        "plain",
+        "one",
+        "two",
+        "too close",
+        "dormers",
+        "panels",
+        "long panels",
+        "eaves",
+        "flat: vents",
+        "low: vents",
+        "flat: edges",
+    ],
 )
 def test_what_else_stands_on_roofs_cuts_nothing(roof, structures):
     assert walls_at(roof, structures) == []
