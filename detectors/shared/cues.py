@@ -162,14 +162,12 @@ def _tally(
 def _noise(points: PointCloud, heights: NDArray[np.float32], low: NDArray[np.intp], grid: Grid) -> float:
     """Return the noise of the heights of low points, metres; see `CellCues`."""
     blocks = Grid.covering(grid.extent, max(_BLOCK, grid.gsd))
-    index, _ = blocks.cells(points.x[low], points.y[low])
-    size, h = blocks.rows * blocks.columns, heights[low].astype(np.float64)
-    count = np.bincount(index, minlength=size)
+    index, _ = blocks.cells(points.x, points.y)
+    count, total, squares = _sums(index, heights, low, blocks.rows * blocks.columns)
     several = count >= _LEAST_POINTS
     if not several.any():
         return 0.0
-    n, mean = count[several], np.bincount(index, weights=h, minlength=size)[several] / count[several]
-    squares = np.bincount(index, weights=h * h, minlength=size)[several] / n
+    n, mean, squares = count[several], total[several] / count[several], squares[several] / count[several]
     return float(np.median(np.sqrt(np.maximum(squares - mean**2, 0) * n / (n - 1))))
 
 
@@ -177,6 +175,20 @@ def rated(values: _Floats, threshold: float, width: float) -> _Floats:
     """Return the rating of values: -1 (roof) to +1 (tree), 0 at the threshold, the ends a width away from it."""
     ratings: _Floats = np.clip((values - np.float32(threshold)) / np.float32(width), -1, 1)
     return ratings
+
+
+@kernel
+def _sums(
+    index: NDArray[np.intp], heights: NDArray[np.float32], chosen: NDArray[np.intp], size: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the number, the sum of the heights and the sum of their squares of the chosen points of each block."""
+    count, total, squares = np.zeros(size), np.zeros(size), np.zeros(size)
+    for i in chosen:
+        block, height = np.uintp(index[np.uintp(i)]), np.float64(heights[np.uintp(i)])
+        count[block] += 1
+        total[block] += height
+        squares[block] += height * height
+    return count, total, squares
 
 
 def _box(values: _Floats) -> _Floats:

@@ -70,9 +70,15 @@ class Heights:
             Heights of this many metres or more, and those 10 m or more below the ground, are errors.
         """
         finite = np.isfinite(points.x) & np.isfinite(points.y) & np.isfinite(points.z)
+        x, y, z = points.x, points.y, points.z
+        if not finite.all():
+            x, y, z = x[finite], y[finite], z[finite]
+        above = z - self.ground.sample(x, y)
+        above[~((above > -10) & (above < highest))] = np.nan
+        if len(above) == len(points):
+            return above.astype(np.float32)
         heights = np.full(len(points), np.nan, dtype=np.float32)
-        above = points.z[finite] - self.ground.sample(points.x[finite], points.y[finite])
-        heights[finite] = np.where((above > -10) & (above < highest), above, np.nan)
+        heights[finite] = above
         return heights
 
 

@@ -102,3 +102,13 @@ def test_tallies_equal_those_of_one_point_at_a_time():
     assert low.tolist() == np.flatnonzero(used & (heights < 1)).tolist()
     assert several
     assert not module._tally(index, inside, heights, module._NO_RETURNS, 2.5, (2, 3))[-1]
+
+
+def test_sums_of_blocks_equal_those_of_bincount():
+    rng = np.random.default_rng(6)
+    index, heights = rng.integers(0, 9, 200), rng.normal(size=200).astype(np.float32)
+    chosen = np.flatnonzero(rng.random(200) < 0.5)
+    sums = module._sums(index, heights, chosen, 9)
+    high = heights[chosen].astype(np.float64)
+    for found, weights in zip(sums, (None, high, high**2), strict=True):
+        np.testing.assert_allclose(found, np.bincount(index[chosen], weights, minlength=9))
