@@ -31,6 +31,7 @@ ABLATIONS = {
         "ground=tile-dem",
         "ground=tile-mode",
         "vegetation=pseudo-ndvi",
+        "adjustment_reference=longer",
         "adjustment_reference=any",
         "adjustment_share=1",
         "missed_corner=1000",
@@ -45,6 +46,7 @@ ABLATIONS = {
         "rise=0",
         "compare=whole",
         "new_share=0",
+        "new_width=0",
         "same_overlap=1",
     ),
     "improved": (
@@ -74,6 +76,7 @@ ABLATIONS = {
         "inside_margin=0",
         "rise=0",
         "new_share=0",
+        "new_width=2",
         "same_overlap=1",
     ),
 }
