@@ -42,11 +42,13 @@ from .wall_colours import Colours, colours_at
 __all__ = [
     "CERTAIN",
     "PROBABLE",
+    "Profile",
     "Wall",
     "WallRule",
     "colour_strength",
     "most_walls",
     "party_walls",
+    "profile_of",
     "raised_strength",
     "wall_strength",
 ]
@@ -123,16 +125,44 @@ def most_walls(rectangles: Rectangles, grid: Grid) -> NDArray[np.int64]:
     return np.where(sides[:, 0] < _SHALLOWEST, 0, np.maximum(room, 0))
 
 
-def party_walls(
+class Profile(NamedTuple):
+    """What is known of the roofs of a rectangle for any rule.
+
+    Attributes
+    ----------
+    place, along, across : ndarray, shape (2,)
+        The first corner, metres in the grid frame, and the directions along the row and across it, unit length.
+    length : float
+        Along the row, m.
+    roof : ndarray, shape (stations, lines)
+        Heights without what stands on the roofs, m, outermost lines included.
+    shares : ndarray, shape (2, stations, lines), or None
+        Shares of red and of blue.
+    rise : ndarray, shape (stations, lines), or None
+        See `raised_walls`.
+    chimneys : ndarray or None
+        Stations of the chimneys; None on a flat roof.
+    """
+
+    place: Floats
+    along: Floats
+    across: Floats
+    length: float
+    roof: Floats
+    shares: Floats | None
+    rise: Floats | None
+    chimneys: Floats | None
+
+
+def profile_of(
     rectangle: Rectangles,
     height: NDArray[np.uint16],
     state: NDArray[np.uint8],
     grid: Grid,
-    rule: WallRule,
     colours: Colours | None = None,
     structures: NDArray[np.uint8] | None = None,
-) -> list[Wall]:
-    """Return the party walls across the longer side of a rectangle, in order; none where houses would be wide.
+) -> Profile | None:
+    """Return the profile of a rectangle; None where it is too small for houses.
 
     Parameters
     ----------
@@ -143,7 +173,6 @@ def party_walls(
     state : ndarray of uint8, shape (rows, columns)
         See `cells`.
     grid : Grid
-    rule : WallRule
     colours : Colours, optional
         Around the rectangle, where there is an image.
     structures : ndarray of uint8, shape (rows, columns), optional
@@ -156,7 +185,7 @@ def party_walls(
     if length < depth:
         first, second, length, depth = second, first, depth, length
     if length < 2 * _NARROWEST or depth < _SHALLOWEST:
-        return []
+        return None
     u, v = first / length, second / depth
     stations = np.arange(_LATTICE / 2, length, _LATTICE)
     lines = np.arange(_LATTICE / 2, depth, _LATTICE)
@@ -164,24 +193,45 @@ def party_walls(
     column = np.clip(_cell_of(x), 0, grid.columns - 1)
     row = np.clip(_cell_of(y), 0, grid.rows - 1)
     high = state[row, column] == HIGH
-    profile = np.where(high, height[row, column] / 100.0, np.nan)
-    inner = np.s_[:, 1:-1]
-    strength = wall_strength(profile[inner], rule)
-    if colours is not None and depth <= _DEEPEST:
-        strength += colour_strength(np.where(high, colours_at(colours, row, column), np.nan)[:, :, 1:-1], rule)
-    if structures is not None:
-        strength += raised_strength(profile, profile + structures[row, column] / 100.0, rule)
+    roof = np.where(high, height[row, column] / 100.0, np.nan)
+    shares = rise = stacks = None
+    if depth <= _DEEPEST and colours is not None:
+        shares = np.where(high, colours_at(colours, row, column), np.nan)
+    if depth <= _DEEPEST and structures is not None:
+        rise = rises(roof + structures[row, column] / 100.0)
+        stacks = chimneys(rise) if _is_pitched(roof) else None
+    return Profile(place[0], u, v, length, roof, shares, rise, stacks)
+
+
+def _is_pitched(roof: Floats) -> bool:
+    section = line_medians(roof[:, 1:-1].T, np.nan)
+    section = section[np.isfinite(section)]
+    least = max(_PITCHED, _PITCH * _LATTICE * roof.shape[1] / 2)
+    return len(section) > 0 and bool(np.ptp(section) >= least)
+
+
+def party_walls(profile: Profile | None, rule: WallRule, grid: Grid) -> list[Wall]:
+    """Return the party walls across the longer side of a rectangle, in order; none where houses would be wide."""
+    if profile is None:
+        return []
+    inner = np.s_[..., 1:-1]
+    strength = wall_strength(profile.roof[inner], rule)
+    if profile.shares is not None:
+        strength += colour_strength(profile.shares[inner], rule)
+    if profile.rise is not None:
+        strength += raised_strength(profile.rise, profile.chimneys, rule)
     found: list[float] = []
     for station in np.argsort(-strength, kind="stable"):
         if strength[station] <= 0:
             break
         at = station * _LATTICE
-        if _NARROWEST <= at <= length - _NARROWEST and all(abs(at - other) >= _NARROWEST for other in found):
+        inside = _NARROWEST <= at <= profile.length - _NARROWEST
+        if inside and all(abs(at - other) >= _NARROWEST for other in found):
             found.append(at)
     found.sort()
-    if not found or np.median(np.diff([0.0, *found, length])) > _WIDEST:
+    if not found or np.median(np.diff([0.0, *found, profile.length])) > _WIDEST:
         return []
-    return [Wall((place[0] + at * u) / grid.gsd, v) for at in found]
+    return [Wall((profile.place + at * profile.along) / grid.gsd, profile.across) for at in found]
 
 
 def _cell_of(place: Floats) -> NDArray[np.int64]:
@@ -222,26 +272,21 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     return strength
 
 
-def raised_strength(roof: Floats, profile: Floats, rule: WallRule) -> Floats:
+def raised_strength(rise: Floats, stacks: Floats | None, rule: WallRule) -> Floats:
     """Return the evidence of parapets and chimneys for a wall before each station, m, shape (stations,).
 
     Parameters
     ----------
-    roof, profile : ndarray, shape (stations, lines)
-        Heights of all lines without and with what stands on the roofs.
+    rise : ndarray, shape (stations, lines)
+        See `raised_walls`.
+    stacks : ndarray or None
+        Stations of the chimneys; None on a flat roof.
     rule : WallRule
     """
-    count, lines = profile.shape
-    if _LATTICE * lines > _DEEPEST:
-        return np.zeros(count)
-    rise = rises(profile)
     strength = parapet_strength(rise[:, 1:-1], rule.parapet_share, rule.parapet)
-    section = line_medians(roof[:, 1:-1].T, np.nan)
-    section = section[np.isfinite(section)]
-    if len(section) == 0 or np.ptp(section) < max(_PITCHED, _PITCH * _LATTICE * lines / 2):
+    if stacks is None:
         return repeated(strength)
-    found = chimneys(rise)
-    for station in found if rule.single else series(found):
+    for station in stacks if rule.single else series(stacks):
         strength[round(float(station))] += _CHIMNEY_METRES
     return strength
 

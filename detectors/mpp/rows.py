@@ -31,7 +31,7 @@ from ...scenes.geodata.raster import Grid, Image
 from .arrays import Rectangles
 from .bends import count_bends
 from .buildings import block_of, outline_buildings
-from .party_walls import CERTAIN, PROBABLE, Wall, most_walls, party_walls
+from .party_walls import CERTAIN, PROBABLE, Profile, Wall, most_walls, party_walls, profile_of
 from .rectangles import to_world
 from .wall_colours import colours_of
 
@@ -116,10 +116,12 @@ def find_levels(
     # Most blocks are too small for a row, whatever their roofs look like.
     looked_at = inside & np.append(_are_rows(blocks, room), False)[block]
     certain = np.zeros(len(rectangles), dtype=np.int64)
+    profiles: dict[int, Profile | None] = {}
     image = image_of() if looked_at.any() else None
     colours = {number: colours_of(blocks[number], image, grid) for number in np.unique(block[looked_at]).tolist()}
     for k in np.flatnonzero(looked_at).tolist():
-        certain[k] = len(party_walls(rectangles[k], height, state, grid, CERTAIN, colours[block[k]], structures))
+        profiles[k] = profile_of(rectangles[k], height, state, grid, colours[block[k]], structures)
+        certain[k] = len(party_walls(profiles[k], CERTAIN, grid))
     walls_of_block = np.bincount(block[inside], weights=certain[inside], minlength=len(blocks))
     for number in np.unique(block[looked_at]).tolist():
         members = np.flatnonzero(block == number)
@@ -152,10 +154,7 @@ def find_levels(
             buildings.append(blocks[number])
             block_of_building.append(number)
             continue
-        near = colours[number]
-        walls = [
-            party_walls(rectangle, height, state, grid, PROBABLE, near, structures) for rectangle in rectangles[members]
-        ]
+        walls = [party_walls(profiles[k], PROBABLE, grid) for k in members.tolist()]
         pieces, owners = _pieces(rectangles[members], blocks[number], walls, grid)
         group = _houses(pieces, owners)
         parts += pieces

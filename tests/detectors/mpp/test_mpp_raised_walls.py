@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roofbench.detectors.mpp.cells import HIGH, LOW
-from roofbench.detectors.mpp.party_walls import CERTAIN, PROBABLE, party_walls
+from roofbench.detectors.mpp.party_walls import CERTAIN, PROBABLE, party_walls, profile_of
 from roofbench.detectors.mpp.raised_walls import chimneys, parapet_strength, rises, series
 from roofbench.detectors.mpp.rectangles import to_world
 from roofbench.detectors.mpp.rows import find_levels
@@ -58,7 +58,7 @@ def walls_at(roof, structures, rule=CERTAIN, noise=0.02):
     height, state, standing = cells(roof, structures, noise)
     return [
         wall.point[0] * GRID.gsd
-        for wall in party_walls(rectangle(*ROW), height, state, GRID, rule, structures=standing)
+        for wall in party_walls(profile_of(rectangle(*ROW), height, state, GRID, structures=standing), rule, GRID)
     ]
 
 
@@ -132,8 +132,8 @@ def test_on_a_deep_roof_nothing_is_a_wall():
     height, state, standing = cells(flat, [(x, 10, x + 0.5, 28, 0.5) for x in WALLS])
     height[20:56, 20:92], state[20:56, 20:92] = 700, HIGH
     for depth, count in ((15, 5), (18, 0)):
-        found = party_walls(rectangle(10, 10, 46, 10 + depth), height, state, GRID, CERTAIN, structures=standing)
-        assert len(found) == count
+        profile = profile_of(rectangle(10, 10, 46, 10 + depth), height, state, GRID, structures=standing)
+        assert len(party_walls(profile, CERTAIN, GRID)) == count
 
 
 def test_between_gables_that_face_the_street_nothing_rises():

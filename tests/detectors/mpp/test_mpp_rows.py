@@ -16,6 +16,7 @@ from roofbench.detectors.mpp.party_walls import (
     colour_strength,
     most_walls,
     party_walls,
+    profile_of,
     wall_strength,
 )
 from roofbench.detectors.mpp.profiles import line_medians
@@ -56,7 +57,7 @@ def flat(x, y):
 
 
 def walls_at(roof, sides, rule=CERTAIN):
-    found = party_walls(rectangle(*sides), *place((sides, roof)), GRID, rule)
+    found = party_walls(profile_of(rectangle(*sides), *place((sides, roof)), GRID), rule, GRID)
     return [wall.point[0] * GRID.gsd for wall in found]
 
 
@@ -94,13 +95,13 @@ def test_no_more_walls_are_found_than_there_is_room_for(length, depth, seed):
     sides = (10, 10, 10 + length, 10 + depth)
     height, state = place((sides, lambda x, y: 6 + ups[np.clip((2 * x).astype(int), 0, 399)]))
     one = rectangle(*sides)
-    assert len(party_walls(one, height, state, GRID, PROBABLE)) <= most_walls(one, GRID)[0]
+    assert len(party_walls(profile_of(one, height, state, GRID), PROBABLE, GRID)) <= most_walls(one, GRID)[0]
 
 
 def test_walls_turn_with_the_row():
     height, state = place(((0, 0, 130, 80), lambda x, y: 9.0 - np.abs((u(x, y)) % 6.0 - 3.0)))
     row = np.array([130.0, 80.0, 72.0, 20.0, math.radians(30)])
-    found = party_walls(row, height, state, GRID, CERTAIN)
+    found = party_walls(profile_of(row, height, state, GRID), CERTAIN, GRID)
     assert len(found) == 5
     for wall in found:
         np.testing.assert_allclose(np.abs(wall.along), [0.5, math.sqrt(0.75)], atol=1e-12)
@@ -119,8 +120,8 @@ def test_walls_do_not_depend_on_the_cell_that_a_window_begins_with():
     padded = [np.pad(cells, ((rows, 0), (columns, 0))) for cells in (height, state)]
     for one in turned:
         moved = one + np.array([columns, rows, 0, 0, 0])
-        here = party_walls(one, height, state, GRID, PROBABLE)
-        there = party_walls(moved, *padded, around, PROBABLE)
+        here = party_walls(profile_of(one, height, state, GRID), PROBABLE, GRID)
+        there = party_walls(profile_of(moved, *padded, around), PROBABLE, around)
         assert len(here) == len(there)
         for wall, same in zip(here, there, strict=True):
             assert np.allclose(wall.point + np.array([columns, rows]), same.point, atol=1e-6)
