@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -17,10 +18,12 @@ from pathlib import Path
 
 from .errors import OutputError
 
-__all__ = ["check_folder", "check_target", "make_folder_for", "whole_file", "whole_folder"]
+__all__ = ["check_folder", "check_target", "is_scratch", "make_folder_for", "whole_file", "whole_folder"]
 
 #: Errors of a file system that has no room: they name no file.
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+#: Names of temporary folders, which `tempfile.mkdtemp` ends with eight random characters.
+_SCRATCH = re.compile(r"\..+\.[a-z0-9_]{8}")
 
 
 def check_target(path: Path, overwrite: bool) -> None:
@@ -126,3 +129,12 @@ def _scratch(target: Path, place: Path | None = None) -> Iterator[Path]:
         raise OutputError(f"{target} cannot be written: {error.strerror}") from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def is_scratch(path: Path) -> bool:
+    """Return whether a path is the temporary folder of an output: one being written, or left by a killed process.
+
+    >>> is_scratch(Path("houses.gpkg"))
+    False
+    """
+    return path.is_dir() and not path.is_symlink() and _SCRATCH.fullmatch(path.name) is not None

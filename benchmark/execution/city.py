@@ -11,6 +11,7 @@ work folder
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
@@ -20,7 +21,7 @@ from typing import NamedTuple
 
 from ...core.digests import digest
 from ...core.errors import OutputError, ParameterError
-from ...core.output import check_target, whole_file
+from ...core.output import check_target, is_scratch, whole_file
 from ...detectors.base import Detector
 from ...detectors.seams import Seams, join_strips
 from ...detectors.tiling import Measured, Tile, measure, tiles_of
@@ -308,10 +309,12 @@ def _keep(job: _Job, future: Future[bytes]) -> Outcome:
 
 
 def remove_tiles(folder: Path) -> None:
-    """Remove a work folder; files of others in it stay."""
+    """Remove a work folder, with what a killed process was writing in it; files of others in it stay."""
     for file in folder.iterdir():
         name, _, key = file.name.partition(".")
-        if file.name == _MEASURED or (len(key) == 32 and name.replace("_", "").replace("-", "").isdigit()):
+        if is_scratch(file):
+            shutil.rmtree(file, ignore_errors=True)
+        elif file.name == _MEASURED or (len(key) == 32 and name.replace("_", "").replace("-", "").isdigit()):
             file.unlink()
     with suppress(OSError):
         folder.rmdir()

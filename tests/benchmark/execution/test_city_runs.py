@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -14,11 +15,13 @@ from harness.command_line import run
 
 import roofbench as rb
 from roofbench.benchmark.execution import city_runs, worker
+from roofbench.benchmark.execution.city import remove_tiles
 from roofbench.benchmark.execution.executors import Execution
 from roofbench.benchmark.execution.runner import run_plan
 from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store
 from roofbench.benchmark.suite import read_suite
+from roofbench.core.output import is_scratch, whole_file
 from roofbench.detectors.tiling import tiles_over
 from roofbench.evaluators.verdict_table import VerdictTable
 from roofbench.scenes.folder import save_scene, write_reference
@@ -108,7 +111,7 @@ def command(suite, store):
 
 
 def finished(store):
-    return sorted(file.name for file in store.with_name(store.name + ".tiles").glob("*/*_*.*"))
+    return sorted(file.name for file in store.with_name(store.name + ".tiles").glob("*/[!.]*_*.*"))
 
 
 def test_a_killed_city_run_resumes_with_the_tiles_that_are_missing(place, tmp_path, monkeypatch):
@@ -131,7 +134,27 @@ def test_a_killed_city_run_resumes_with_the_tiles_that_are_missing(place, tmp_pa
     resumed = measured(place / "suite.toml", store, Execution(jobs=0))
     assert not set(waiting) & set(before)
     assert_same(resumed, measured(place / "suite.toml", tmp_path / "whole.sqlite", Execution(jobs=0)))
-    assert not finished(store)
+    assert not store.with_name(store.name + ".tiles").exists()
+
+
+def test_what_a_killed_process_was_writing_goes_with_the_work_folder(tmp_path):
+    """A process that is killed while it writes leaves a temporary folder; files of others stay."""
+    folder = tmp_path / "city.fgb.tiles"
+    folder.mkdir()
+    with ExitStack() as killed:
+        for name in ("15_32.3e2c8b6f18e547f309a66b8bc4e9a67d", "city.fgb"):
+            scratch = killed.enter_context(whole_file(folder / name))
+            scratch.write_bytes(b"half")
+            assert is_scratch(scratch.parent)
+        left = killed.pop_all()  # never ended while the test runs
+    (folder / "15_33.3e2c8b6f18e547f309a66b8bc4e9a67d").write_bytes(b"tile")
+    remove_tiles(folder)
+    assert left is not None
+    assert not folder.exists()
+    folder.mkdir()
+    (folder / "notes.txt").write_text("of a user")
+    remove_tiles(folder)
+    assert [file.name for file in folder.iterdir()] == ["notes.txt"]
 
 
 def test_a_broken_file_fails_the_run_and_keeps_the_other_tiles(tmp_path):
