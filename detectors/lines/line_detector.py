@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import cv2
 import numpy as np
@@ -44,9 +44,6 @@ __all__ = ["LineDetector"]
 
 #: The edge of a mask lies half a pixel outside the centres of its border pixels.
 _OUTSET = 0.5
-#: Point spacing of the 2010 paper, metres. Outlines of denser points are not more certain: the positions of points err,
-#: and eaves are ragged. On closer curve points, chords get shorter than these errors, and sides break at false corners.
-_LEAST_SPACING = 0.5
 #: Distance of curve points, point spacings: the paper's pixel of 0.15 m at its spacing.
 _CURVE_STEP = 0.3
 #: Least length of a part of a side that is tested, point spacings: its first step then contains ten points or more.
@@ -62,7 +59,15 @@ _NO_ENTROPY = np.zeros((0, 1), dtype=np.int32)
 
 @dataclass(frozen=True, kw_only=True)
 class LineDetector(LineParameters):
-    """Shared steps of the detectors `original` and `improved`."""
+    """Shared steps of the detectors `original` and `improved`.
+
+    Attributes
+    ----------
+    closest : float
+        Point spacing below which curve points and corners of outlines do not follow the spacing, metres.
+    """
+
+    closest: ClassVar[float] = 0.0
 
     def run(self, rasters: Rasters) -> Trace:
         """Run all steps that follow the masks, keeping the intermediate results."""
@@ -246,7 +251,7 @@ class LineDetector(LineParameters):
             product=self.corner_product,
             straight=(self.corner_angle, 360.0 - self.corner_angle),
         )
-        missed = self.missed_corner or max(_MISSED_CORNER * max(rasters.spacing, _LEAST_SPACING), _STAIRCASE * gsd)
+        missed = self.missed_corner or max(_MISSED_CORNER * max(rasters.spacing, self.closest), _STAIRCASE * gsd)
         segments = fit_segments(
             curves, points, corners, offsets, shortest=self.minimum_side / gsd - 2 * _OUTSET, deviation=missed / gsd
         )
@@ -312,7 +317,7 @@ class LineDetector(LineParameters):
     def _sample(self, rasters: Rasters) -> float:
         if self.curve_step is not None:
             return self.curve_step
-        return max(_CURVE_STEP * max(rasters.spacing, _LEAST_SPACING), rasters.gsd / 3)
+        return max(_CURVE_STEP * max(rasters.spacing, self.closest), rasters.gsd / 3)
 
     def _extended(self, rasters: Rasters, lines: Boxes, green: NDArray[np.bool_]) -> Boxes:
         depth = self.extension / rasters.gsd

@@ -6,6 +6,7 @@ import shapely
 from builders.line_scenes import GREEN_ROOF, LEAVES, SceneBuilder, corners_off, rectangle
 
 from roofbench.detectors.lines.improved import Improved
+from roofbench.detectors.lines.original import Original
 from roofbench.detectors.lines.trace import Outcome
 from roofbench.detectors.registry import make_detector
 from roofbench.scenes.geodata.points import PointCloud
@@ -111,3 +112,14 @@ def test_parameters_that_are_declared_without_effect_have_none(base):
     after = changed.detect(scene.for_detection(), np.random.default_rng(0))
     assert [polygon.wkb for polygon in after.polygons] == [polygon.wkb for polygon in before.polygons]
     assert len(before) > 0
+
+
+def test_curve_points_and_corners_follow_the_spacing_of_dense_points_in_original_alone():
+    scene = SceneBuilder(spacing=0.3).house(rectangle(30, 30, 15, 10, 20)).build()
+    as_in_print = {"curve_step": 0.15, "missed_corner": 0.2}
+    assert detect(scene).polygons.tolist() == detect(scene, **as_in_print).polygons.tolist()
+    original = [
+        Original(**values).detect(scene.for_detection(), np.random.default_rng(0)).polygons.tolist()
+        for values in ({}, as_in_print)
+    ]
+    assert original[0] != original[1]
