@@ -38,6 +38,7 @@ __all__ = [
     "box_centres",
     "box_corners",
     "column_range",
+    "from_box",
     "length_inside",
     "lengths",
     "prefix_sums",
@@ -172,6 +173,12 @@ def to_box(x: float, y: float, box: NDArray[np.float64]) -> tuple[float, float]:
     """Return the coordinates (u, v) of a point (x, y) along and across a box."""
     dx, dy = x - box[OX], y - box[OY]
     return dx * box[UX] + dy * box[UY], -dx * box[UY] + dy * box[UX]
+
+
+@kernel
+def from_box(u: float, v: float, box: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the point (x, y) with coordinates (u, v) along and across a box: the inverse of `to_box`."""
+    return box[OX] + u * box[UX] - v * box[UY], box[OY] + u * box[UY] + v * box[UX]
 
 
 @kernel

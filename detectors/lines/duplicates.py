@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...core.kernels import kernel
 from .adjustment import rotation_between
-from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, Boxes, box_centres, lengths, to_box, widths
+from .boxes import U0, U1, UX, UY, V0, V1, Boxes, box_centres, from_box, lengths, to_box, widths
 
 __all__ = ["DuplicateRules", "find_duplicates"]
 
@@ -61,8 +61,7 @@ def new_share(box: NDArray[np.float64], others: NDArray[np.float64]) -> float:
         along = box[U0] + (i + 0.5) * (box[U1] - box[U0]) / _LATTICE
         for j in range(_LATTICE):
             across = box[V0] + (j + 0.5) * (box[V1] - box[V0]) / _LATTICE
-            x = box[OX] + along * box[UX] - across * box[UY]
-            y = box[OY] + along * box[UY] + across * box[UX]
+            x, y = from_box(along, across, box)
             new += 1
             for k in range(len(others)):
                 u, v = to_box(x, y, others[k])
@@ -91,8 +90,7 @@ def adds_width(box: NDArray[np.float64], others: NDArray[np.float64], width: flo
         beside = 0
         for j in range(columns):
             side = box[V0] + (j + 0.5) * depth / columns
-            x = box[OX] + along * box[UX] - side * box[UY]
-            y = box[OY] + along * box[UY] + side * box[UX]
+            x, y = from_box(along, side, box)
             run[j] += 1
             for k in range(len(others)):
                 u, v = to_box(x, y, others[k])

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.kernels import kernel
-from .boxes import OX, OY, U0, U1, UX, UY, V0, V1, column_range, row_range, to_box
+from .boxes import U0, U1, V0, V1, column_range, from_box, row_range, to_box
 from .colours import Colours, dominant_ranges, yiq_bins
 
 __all__ = ["DROPPED", "FinalRules", "final_rectangles", "shrink"]
@@ -93,8 +93,7 @@ def lies_inside(inner: NDArray[np.float64], outer: NDArray[np.float64]) -> bool:
     slack = 1e-9
     for along in (inner[U0], inner[U1]):
         for across in (inner[V0], inner[V1]):
-            x = inner[OX] + along * inner[UX] - across * inner[UY]
-            y = inner[OY] + along * inner[UY] + across * inner[UX]
+            x, y = from_box(along, across, inner)
             u, v = to_box(x, y, outer)
             if u < outer[U0] - slack or u > outer[U1] + slack or v < outer[V0] - slack or v > outer[V1] + slack:
                 return False
@@ -113,8 +112,8 @@ def black_shares(
         u = strip[U0] + np.divide((i + 0.5) * (strip[U1] - strip[U0]), across)  # without a test for zero
         for j in range(down):
             v = strip[V0] + np.divide((j + 0.5) * (strip[V1] - strip[V0]), down)
-            column = math.floor(strip[OX] + u * strip[UX] - v * strip[UY])
-            row = math.floor(strip[OY] + u * strip[UY] + v * strip[UX])
+            x, y = from_box(u, v, strip)
+            column, row = math.floor(x), math.floor(y)
             if 0 <= row < rows and 0 <= column < columns:
                 black += primary[np.uintp(row), np.uintp(column)]
                 filled += secondary[np.uintp(row), np.uintp(column)]
@@ -131,8 +130,8 @@ def colour_share(colours: Colours, within: NDArray[np.bool_], strip: NDArray[np.
         u = strip[U0] + np.divide((i + 0.5) * (strip[U1] - strip[U0]), across)  # without a test for zero
         for j in range(down):
             v = strip[V0] + np.divide((j + 0.5) * (strip[V1] - strip[V0]), down)
-            column = math.floor(strip[OX] + u * strip[UX] - v * strip[UY])
-            row = math.floor(strip[OY] + u * strip[UY] + v * strip[UX])
+            x, y = from_box(u, v, strip)
+            column, row = math.floor(x), math.floor(y)
             if not (0 <= row < rows and 0 <= column < columns):
                 continue
             y_bin, i_bin, q_bin = yiq_bins(colours, row, column)

@@ -10,10 +10,12 @@ from naive import lines as naive_lines
 from roofbench.detectors.lines.boxes import (
     box_centres,
     box_corners,
+    from_box,
     lengths,
     prefix_sums,
     sum_in_box,
     sums_in_box,
+    to_box,
     widths,
 )
 
@@ -57,3 +59,12 @@ def test_corners_centre_length_and_width_follow_from_the_intervals():
     assert box_corners(box)[0].tolist() == [[9, 18], [9, 24], [7, 24], [7, 18]]
     assert box_centres(box).tolist() == [[8, 21]]
     assert (lengths(box)[0], widths(box)[0]) == (6, 2)
+
+
+def test_places_along_and_across_a_box_and_back_are_the_same():
+    box = np.array([12.0, 7.0, np.cos(0.4), np.sin(0.4), -3.0, 9.0, -2.0, 5.0])
+    assert from_box(0.0, 0.0, box) == (12.0, 7.0)
+    for u, v in ((9.0, -2.0), (-3.0, 5.0), (0.5, 0.25)):
+        assert to_box(*from_box(u, v, box), box) == pytest.approx((u, v))
+    corners = box_corners(box[None])[0]
+    assert [from_box(u, v, box) for u, v in ((-3, -2), (9, -2), (9, 5), (-3, 5))] == [pytest.approx(c) for c in corners]
