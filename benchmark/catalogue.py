@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 from ..core.errors import ParameterError, RoofbenchError, UnknownNameError
-from ..core.parameters import Parameter, parameter_text
+from ..core.parameter_rules import Parameter, parameter_text
 from ..core.registry import nearest_hint, parse_selection
 from ..detectors.base import Detector
 from ..detectors.registry import DETECTORS, make_detector

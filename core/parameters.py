@@ -12,15 +12,15 @@ default, whatever was given, so that equal runs have equal keys: ``improved[voti
 ``improved[voting=false]``.
 
 A *mode* is a named set of defaults: `Parameterised.modes` maps values of the parameter ``mode`` to defaults that
-replace those of the fields. A parameter that is given beside the mode overrides it: ``original[mode=paper,rise=0.1]``.
+replace those of the fields. A parameter that is *given*, by name on construction, overrides it, whatever its value:
+``original[mode=paper,rise=0.1]``. An object remembers which were given, so that a later change of the mode or of other
+defaults (`with_defaults`) leaves them as they are; equality and `changed` do not see it.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
-import math
-import numbers
 import types
 import typing
 from collections.abc import Mapping
@@ -29,113 +29,13 @@ from typing import Any, ClassVar, Self
 from .conditions import Uses, counts_beside, uses_in_words
 from .display import Displayed
 from .errors import ParameterError
+from .parameter_rules import Parameter, parameter_text
 from .registry import nearest_hint
 
-__all__ = ["Parameter", "Parameterised", "execution_option", "parameter", "parameter_text"]
+__all__ = ["Parameterised", "execution_option", "parameter"]
 
 #: Names of parameters that a message lists at most.
 _MOST_NAMES = 24
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Parameter:
-    """What is known of one parameter.
-
-    Attributes
-    ----------
-    name : str
-        Field name.
-    type : type
-        float, int, bool or str (the part besides ``None`` of an optional one).
-    optional : bool
-        Whether ``None`` is a value.
-    default : object
-    unit : str
-        ``"m"``, ``"px"``, ``"deg"``; empty for a pure number.
-    minimum, maximum : float, optional
-        Closed range of a number.
-    choices : tuple
-        The values of an enumeration; empty when any is allowed.
-    doc, source : str
-        Meaning in words, and where the value is printed.
-    swept : tuple
-        Values a paper (or we) sweep.
-    """
-
-    name: str
-    type: type
-    optional: bool
-    default: Any
-    unit: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[Any, ...] = ()
-    doc: str = ""
-    source: str = ""
-    swept: tuple[Any, ...] = ()
-
-    @property
-    def is_reading(self) -> bool:
-        """Whether its source leaves it open, so that it is our reading or comes from a program."""
-        return bool({"reading", "program"} & {part.strip() for part in self.source.split(";")})
-
-    @property
-    def range_text(self) -> str:
-        """The rule in words, for messages and documentation."""
-        if self.choices:
-            return "one of " + ", ".join(map(str, self.choices))
-        unit = f" {self.unit}" if self.unit else ""
-        if self.minimum is not None and self.maximum is not None:
-            return f"from {self.minimum:g} to {self.maximum:g}{unit}"
-        if self.minimum is not None:
-            return f"at least {self.minimum:g}{unit}"
-        if self.maximum is not None:
-            return f"at most {self.maximum:g}{unit}"
-        return {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}[self.type]
-
-    def check(self, value: Any, owner: str) -> Any:
-        """Return `value` as this parameter's type, or raise `ParameterError` naming rule and remedy."""
-        if value is None and self.optional:
-            return None
-        wanted = ParameterError(f"{owner}: {self.name} must be {self.range_text}, not {value!r}")
-        if self.type is bool:
-            if not isinstance(value, bool):
-                raise wanted
-        elif self.type in (int, float):
-            if isinstance(value, bool) or not isinstance(value, numbers.Real):
-                raise wanted
-            if not math.isfinite(value):
-                raise ParameterError(f"{owner}: {self.name} must be a finite number {self.range_text}, not {value!r}")
-            number = float(value)
-            if self.type is int and not number.is_integer():
-                raise wanted
-            value = self.type(number)
-            if self.minimum is not None and value < self.minimum:
-                raise wanted
-            if self.maximum is not None and value > self.maximum:
-                raise wanted
-        elif not isinstance(value, str):
-            raise wanted
-        if self.choices and value not in self.choices:
-            raise wanted
-        return value
-
-    def parse(self, text: str, owner: str) -> Any:
-        """Read a value from the command line, e.g. ``"400"`` or ``"true"``."""
-        plain = text.strip().strip("\"'")
-        if self.optional and plain.lower() in ("none", "null", ""):
-            return None
-        value: Any = plain
-        if self.type is bool:
-            value = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}.get(
-                plain.lower(), plain
-            )
-        elif self.type in (int, float):
-            try:
-                value = float(plain)
-            except ValueError:
-                value = plain
-        return self.check(value, owner)
 
 
 def parameter(
@@ -199,15 +99,6 @@ def execution_option(
     return dataclasses.field(default=default, compare=False, metadata={"execution": facts})
 
 
-def parameter_text(value: Any) -> str:
-    """Return the value of a parameter as labels and tables write it.
-
-    >>> parameter_text(0.25), parameter_text(3.0), parameter_text("exact")
-    ('0.25', '3', 'exact')
-    """
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
 class Parameterised(Displayed):
     """Mixin of frozen dataclasses whose fields are parameters: checked on construction, listed on request.
 
@@ -237,14 +128,14 @@ class Parameterised(Displayed):
     def __new__(cls, *_: Any, **given: Any) -> Self:
         """Note which parameters are given: a mode sets the others."""
         created = super().__new__(cls)
-        if cls.modes and given:
+        if given:
             object.__setattr__(created, "_given", frozenset(given))
         return created
 
     def __post_init__(self) -> None:
         owner = getattr(self, "name", None) or type(self).__name__
         if self.modes:
-            given = self.__dict__.pop("_given", frozenset())
+            given = self.__dict__.get("_given", frozenset())
             for name, value in self._mode_defaults().items():
                 if name not in given:
                     object.__setattr__(self, name, value)
@@ -324,15 +215,32 @@ class Parameterised(Displayed):
         mode = getattr(self, "mode", None)
         return self.modes.get(mode, {}) if isinstance(mode, str) else {}
 
+    def given(self) -> dict[str, Any]:
+        """Return the values that were chosen: those given by name, and those that differ from their default.
+
+        An object that was made with every parameter is a copy of another one: what it has in common with the defaults
+        was not chosen.
+        """
+        named = self.__dict__.get("_given", frozenset())
+        copied = named >= self.parameters().keys()
+        kept = set() if copied else named - set(self.unused())
+        changed = self.changed()
+        return {name: value for name, value in self.values().items() if name in changed or name in kept}
+
+    def with_defaults(self, values: Mapping[str, Any]) -> Self:
+        """Return a copy with other values of the parameters that are not given."""
+        given = self.given()
+        return self.replaced({name: value for name, value in values.items() if name not in given})
+
     def replaced(self, values: Mapping[str, Any]) -> Self:
-        """Return a copy with other values; a new mode changes every parameter that has the old mode's default.
+        """Return a copy with other values; a new mode changes every parameter that is not given.
 
         Raises
         ------
         ParameterError
             A parameter among `values` has no effect beside the others.
         """
-        copy = type(self).build({**self.execution_values(), **self.changed(), **values})
+        copy = type(self).build({**self.execution_values(), **self.given(), **values})
         for name in copy.unused():
             if name in values:
                 needed = uses_in_words(self.used_with[name], parameter_text)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from textwrap import fill
 
 from ..benchmark.catalogue import Entry
-from ..core.parameters import Parameter, parameter_text
+from ..core.parameter_rules import Parameter, parameter_text
 from .tables import Column, Table
 
 __all__ = ["catalogue_table", "format_entries", "format_entry"]

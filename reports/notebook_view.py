@@ -12,7 +12,8 @@ import numpy as np
 import shapely
 
 from ..benchmark.execution.scene_picture import scene_picture
-from ..core.parameters import Parameter, Parameterised, parameter_text
+from ..core.parameter_rules import Parameter, parameter_text
+from ..core.parameters import Parameterised
 from ..core.wording import counted
 from ..detectors.base import Detector
 from ..evaluators.base import Evaluation

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.parameters import parameter_text
+from ..core.parameter_rules import parameter_text
 from ..scenes import builtin
 from ..scenes.synthetic import SceneParameters, preset_names
 from ..scenes.synthetic.presets import preset

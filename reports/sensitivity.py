@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ..benchmark.analysis.report_data import Sensitivity
-from ..core.parameters import parameter_text
+from ..core.parameter_rules import parameter_text
 from .format import shortened
 from .inline_svg import INK, SERIES, new_figure, style_axes
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..benchmark.analysis.break_down import BreakDown
 from ..core.errors import OutputError
 from ..core.output import check_target, whole_file
-from ..core.parameters import parameter_text
+from ..core.parameter_rules import parameter_text
 from ..evaluators.base import Index
 from .format import column_title, index_name, interval_text, number_text, value_text
 from .tables import Column, Table, inert_cell

@@ -56,7 +56,8 @@ class Measured:
     code : DetectorCode, optional
         The code that ran; None in baselines of version 0.1.
     chosen : tuple of str, optional
-        The parameters that differed from their defaults. None in older baselines, which repeat every value.
+        The parameters that were given or differed from their defaults. None in older baselines, which repeat every
+        value.
     """
 
     recipe: PluginRecipe
@@ -281,7 +282,7 @@ def measure(
                 found = values.get(row.id)
                 runs[row.scene, row.seed] = None if found is None else _rounded(found, keyed.evaluator)
         recipe = PluginRecipe.of(entry.detector).relative_to(Path.cwd())
-        chosen = tuple(entry.detector.changed())
+        chosen = tuple(entry.detector.given())
         detectors[entry.label] = Measured(recipe, entry.seeds, runs, DetectorCode.of(entry.detector), chosen)
     return Baseline(
         suite=suite.name,

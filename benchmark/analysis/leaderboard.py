@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core.parameters import parameter_text
+from ...core.parameter_rules import parameter_text
 from ...core.resampling import expanded_level, resampling_weights
 from ...core.wording import counted
 from ...detectors.registry import DETECTORS

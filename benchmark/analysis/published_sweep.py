@@ -102,7 +102,7 @@ class PublishedSweep:
     figure, detector, source : str
         Its number, the detector, and paper and section.
     parameters : tuple of str
-        Varied one at a time over their declared values (`core.parameters.Parameter.swept`).
+        Varied one at a time over their declared values (`core.parameter_rules.Parameter.swept`).
     scenes : tuple of str
         Words of the default suite.
     seeds : int
@@ -227,10 +227,7 @@ def published_sweep(detector: str, figure: str) -> PublishedSweep:
 def published_axes(suite: Suite, figure: PublishedSweep) -> tuple[Suite, list[Axis]]:
     """Return the suite with the figure's standard values where none are given, and the axes of its parameters."""
     entry = suite.detectors[0]
-    given = entry.detector.changed()
-    standard = {name: value for name, value in figure.standard.items() if name not in given}
-    detector = entry.detector.replaced(standard)
-    suite = replace(suite, detectors=(DetectorEntry(detector, entry.seeds),))
+    suite = replace(suite, detectors=(DetectorEntry(entry.detector.with_defaults(figure.standard), entry.seeds),))
     return suite, axes_of(figure.parameters, suite)
 
 

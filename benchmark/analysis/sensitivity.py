@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import InputError, RoofbenchError
-from ...core.parameters import parameter_text
+from ...core.parameter_rules import parameter_text
 from ...detectors.registry import make_detector
 from ...evaluators.base import Index
 from ...evaluators.registry import make_evaluator

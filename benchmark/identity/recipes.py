@@ -16,7 +16,7 @@ from typing import Any, Literal, Self, cast
 
 from ...core.digests import digest
 from ...core.errors import ParameterError, UnknownNameError, UnsupportedError
-from ...core.parameters import parameter_text
+from ...core.parameter_rules import parameter_text
 from ...core.registry import Registry, nearest_hint
 from ...detectors.base import Detector
 from ...detectors.external.external_paths import with_relative_paths

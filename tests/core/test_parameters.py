@@ -88,7 +88,31 @@ def test_a_parameter_beside_a_mode_overrides_it_even_with_the_plain_default(valu
     assert chosen.changed() == {"mode": "paper", "rise": 0.1}
     assert Reading.build(chosen.changed()) == Reading.build(chosen.values()) == chosen
     assert copy.copy(chosen) == pickle.loads(pickle.dumps(chosen)) == chosen
-    assert vars(chosen).keys() == chosen.values().keys()
+    assert pickle.loads(pickle.dumps(chosen)).given() == chosen.given() == {"mode": "paper", "rise": 0.1}
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.1, 0.3])
+def test_what_is_given_stays_beside_another_mode_and_other_defaults_whatever_its_value(rise):
+    chosen = Reading.build({"rise": str(rise)})
+    assert chosen.given() == {"rise": rise}
+    assert chosen.replaced({"mode": "paper"}).values() == {"mode": "paper", "rise": rise, "share": 1.0, "height": 2.5}
+    assert chosen.with_defaults({"rise": 7, "height": 9}) == Reading(rise=rise, height=9)
+    back = chosen.replaced({"mode": "paper"}).replaced({"height": 3}).replaced({"mode": "default"})
+    assert back == Reading(rise=rise, height=3)
+    one = Reading(rise=rise).set_params(mode="paper")
+    assert (one.rise, one.set_params(share=0.5).replaced({"mode": "default"}).rise) == (rise, rise)
+
+
+def test_what_is_given_is_no_part_of_the_value():
+    chosen = Reading(rise=0.1)
+    assert (chosen, hash(chosen), repr(chosen), chosen.changed()) == (Reading(), hash(Reading()), "Reading()", {})
+
+
+def test_a_copy_with_every_parameter_has_none_given():
+    copied = Reading(**Reading(share=0.7).get_params())
+    assert copied.given() == {"share": 0.7}
+    assert copied.replaced({"mode": "paper"}).rise == 0.0
+    assert Reading(**Reading(mode="paper").get_params()).set_params(mode="default") == Reading()
 
 
 def test_another_mode_changes_what_was_not_overridden():

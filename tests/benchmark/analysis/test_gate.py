@@ -254,8 +254,15 @@ def test_the_command_line_exits_0_1_and_4(cli, misbehaving, tmp_path):
     assert part.exit_code == 4
     assert "needs 10 scenes with a value on both sides for a test at level 0.01, 5 available" in part.stdout
 
-    (tmp_path / "few.toml").write_text(suite_text(misbehaving, 5))
+    written = suite_text(misbehaving, 5).replace("[[evaluators]]", "side = 8.0\n[[evaluators]]")
+    (tmp_path / "few.toml").write_text(written)
     cli("baseline", "save", "-o", "few.json", "--suite", "few.toml", "-j", 0)
+    # A later change of the default would not change a value that is written.
+    chosen = [
+        json.loads((tmp_path / name).read_text())["detectors"]["misbehaving"]["chosen"]
+        for name in ("b.json", "few.json")
+    ]
+    assert chosen == [[], ["side"]]
     assert cli("gate", "few.json", "-d", f"{misbehaving}[side=7.0]", "-j", 0).exit_code == 4
     with pytest.raises(RoofbenchError, match="the same content"):
         cli("gate", "b.json", "b.json")

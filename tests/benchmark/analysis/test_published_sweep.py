@@ -55,9 +55,21 @@ def test_every_parameter_of_a_figure_declares_its_values(figure):
     assert suite.detectors[0].detector.values()["ground"] == "tile-dem"
 
 
-def test_values_that_are_given_are_not_replaced_by_the_standard():
-    suite, _ = published_axes(suite_of_words(["fairfield-1-small"], ["original[ground=tile-mode]"]), FIGURE)
-    assert suite.detectors[0].detector.values()["ground"] == "tile-mode"
+def own_values(selection):
+    suite, _ = published_axes(suite_of_words(["fairfield-1-small"], [selection]), FIGURE)
+    return suite.detectors[0].detector.values()
+
+
+@pytest.mark.parametrize("given", [{"ground": "tile-mode"}, {"ground": "point-dem"}, {"rise": 0.1}, {"new_share": 0.2}])
+def test_values_that_are_given_are_not_replaced_by_the_standard_even_where_they_are_defaults(given):
+    words = ",".join(f"{name}={value}" for name, value in given.items())
+    values = own_values(f"original[{words}]")
+    assert {name: values[name] for name in FIGURE.standard} == {**FIGURE.standard, **given}
+
+
+def test_the_standard_replaces_what_a_mode_sets():
+    assert own_values("original[mode=program]")["ground"] == FIGURE.standard["ground"]
+    assert own_values("original[mode=program,ground=point-dem]")["ground"] == "point-dem"
 
 
 def test_an_axis_without_values_takes_the_declared_ones_or_is_refused():
