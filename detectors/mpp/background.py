@@ -138,18 +138,18 @@ def estimate_background(tally: Integers, cell: float, *, openness: bool = True) 
     for _ in range(_STEPS):
         likelihoods = _log_likelihoods(logs, means, spreads, opens)
         odds = likelihoods[1] - likelihoods[0] + math.log(share / (1 - share))
-        belongs = 1 / (1 + np.exp(-np.clip(odds, -50, 50)))
+        belongs = 1 / (1 + np.exp(-np.minimum(np.maximum(odds, -50), 50)))
         for k, weight in enumerate((counts * (1 - belongs), counts * belongs)):
             centre, width = before[k]
             by_roughness = weight.sum(axis=1)
             size = by_roughness.sum() + pseudo
             means[k] = float((by_roughness @ logs + pseudo * math.log(centre)) / size)
             scatter = by_roughness @ (logs - means[k]) ** 2 + pseudo * (width**2 + (math.log(centre) - means[k]) ** 2)
-            spreads[k] = float(np.clip(math.sqrt(scatter / size), _NARROW, _WIDE))
+            spreads[k] = min(max(math.sqrt(scatter / size), _NARROW), _WIDE)
             if openness:
                 opens[k] = (weight.sum(axis=0) + pseudo * openness_before[k]) / size
         in_crowns = (counts * belongs).sum() + _SHARE_CELLS
-        share = float(np.clip(in_crowns / (size_of_sample + 2 * _SHARE_CELLS), _FEWEST_CROWNS, _MOST_CROWNS))
+        share = float(min(max(in_crowns / (size_of_sample + 2 * _SHARE_CELLS), _FEWEST_CROWNS), _MOST_CROWNS))
     likelihoods = _log_likelihoods(logs, means, spreads, opens)
     evidence = likelihoods[0] - likelihoods[1] + (0.0 if openness else _WITHOUT_OPENNESS)
     # A smoother window is never less likely to be a roof: the tail of the narrower class must not reverse the ratio.

@@ -83,7 +83,8 @@ def _components(mask: Mask) -> Labels:
     """Return the number of the connected part of each cell, 0 outside the mask, with a border of one cell."""
     import cv2
 
-    labels: Labels = cv2.connectedComponents(np.pad(mask.astype(np.uint8), 1), connectivity=4)[1]
+    solid = cv2.copyMakeBorder(mask.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    labels: Labels = cv2.connectedComponents(solid, connectivity=4)[1]
     return labels
 
 

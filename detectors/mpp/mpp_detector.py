@@ -159,7 +159,7 @@ class MPP(MPPParameters, Detector):
             record |= {"seed": seed, "trace": join_traces(results)}
         # Outlines are made from the cells alone: the memory of the tables is released for them.
         prepared = replace(prepared, tables=NO_TABLES)
-        release_memory()
+        release_memory(prepared.height.size)
         found = as_footprints(
             prepared,
             rectangles,

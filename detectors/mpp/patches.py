@@ -93,11 +93,14 @@ def divide_patches(labels: Labels, count: int, division: Division) -> tuple[Labe
     No building is so long. A terrace or a wood can be, and what is made of it must not depend on its far end, which a
     window may not show. Return the labels, pieces after all others, and how many there are.
     """
+    long = np.flatnonzero(longer_patches(labels, count, division.longest))
+    if len(long) == 0:
+        return labels, count
     from scipy.ndimage import find_objects
 
-    for number, place in enumerate(find_objects(labels, count), start=1):
-        if place is None or max(part.stop - part.start for part in place) <= division.longest:
-            continue
+    places = find_objects(labels, count)
+    for number in long.tolist():
+        place = places[number - 1]
         part = labels[place]
         row, column = np.nonzero(part == number)
         square_row = (row + place[0].start + division.row) // division.side

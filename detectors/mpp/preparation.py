@@ -112,7 +112,7 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
     boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, division=division, threads=threads)
     kept = _shortened(height, threads)
     del height
-    release_memory()
+    release_memory(kept.size)
     tables = make_tables(kept, fitted, score, threads=threads)
     model, grid = _model(parameters, cell), Grid.covering(scene.extent, cell)
     rated = _rated(boxes, tables, model, threads)

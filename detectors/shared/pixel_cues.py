@@ -42,7 +42,9 @@ class _Pixels(NamedTuple):
 
     Attributes
     ----------
-    bands : ndarray, shape (2 or 3, rows, columns)
+    bands : ndarray, shape (bands, rows, columns)
+        All bands of the image.
+    chosen : ndarray of int64, shape (2 or 3,)
         Two bands whose normalised difference is wanted, or red, blue and green, whose shares are.
     valid : ndarray of bool, shape (rows, columns)
         Whether a pixel has data; empty where all have.
@@ -53,6 +55,7 @@ class _Pixels(NamedTuple):
     """
 
     bands: NDArray[Any]
+    chosen: NDArray[np.int64]
     valid: NDArray[np.bool_]
     white: np.float32
     darkest: np.float32
@@ -72,7 +75,7 @@ def greenness(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
     if leaves is None:
         return None
     pixels = _pixels(image, (leaves, "red"), darkest)
-    if not pixels.bands.any():
+    if not any(pixels.bands[band].max(initial=0) for band in pixels.chosen):
         return None
     index: _Floats = _cell_means(pixels, *_places(image, grid))[0]
     return index
@@ -90,9 +93,10 @@ def chromaticity(image: Image, grid: Grid, *, darkest: float) -> _Floats | None:
 
 
 def _pixels(image: Image, bands: tuple[str, ...], darkest: float) -> _Pixels:
-    values = image.values[[image.bands.index(name) for name in bands]]
+    values: NDArray[Any] = np.ascontiguousarray(image.values)
+    chosen = np.array([image.bands.index(name) for name in bands])
     valid = _ALL_VALID if image.valid is None else np.ascontiguousarray(image.valid)
-    return _Pixels(values, valid, np.float32(np.iinfo(values.dtype).max), np.float32(darkest))
+    return _Pixels(values, chosen, valid, np.float32(np.iinfo(values.dtype).max), np.float32(darkest))
 
 
 def _places(image: Image, grid: Grid) -> tuple[_Floats, _Floats, int]:
@@ -115,7 +119,8 @@ def _cell_means(pixels: _Pixels, rows: _Floats, columns: _Floats, width: int) ->
     NaN where three quarters of a square or more are not usable. Pixels are read row by row, and no raster of the size
     of the image is made. `rows`, `columns` and `width` are `_places`.
     """
-    count, high, wide = pixels.bands.shape
+    count, (_, high, wide) = len(pixels.chosen), pixels.bands.shape
+    one_band, other_band, last_band = pixels.chosen[0], pixels.chosen[1], pixels.chosen[count - 1]
     means = np.empty((count - 1, len(rows), len(columns)), dtype=np.float32)
     # Sums of the two values and of the weights of usable pixels in each column of the image.
     first, second, weight = np.empty((3, wide), dtype=np.float32)
@@ -126,9 +131,9 @@ def _cell_means(pixels: _Pixels, rows: _Floats, columns: _Floats, width: int) ->
             share = _share_of(rows[i], r - top, width, high)
             for c in range(wide if share > 0 else 0):
                 # np.divide: a loop with an error for division by zero is not vectorised.
-                a = np.divide(np.float32(pixels.bands[0, r, c]), pixels.white)
-                b = np.divide(np.float32(pixels.bands[1, r, c]), pixels.white)
-                g = np.divide(np.float32(pixels.bands[count - 1, r, c]), pixels.white)
+                a = np.divide(np.float32(pixels.bands[one_band, r, c]), pixels.white)
+                b = np.divide(np.float32(pixels.bands[other_band, r, c]), pixels.white)
+                g = np.divide(np.float32(pixels.bands[last_band, r, c]), pixels.white)
                 usable = share if max(a, b, g) >= pixels.darkest else np.float32(0)
                 if len(pixels.valid) > 0:
                     usable *= np.float32(pixels.valid[r, c])

@@ -62,13 +62,15 @@ def trace(coverage: NDArray[np.float32], grid: Grid) -> NDArray[np.object_]:
     import contourpy
 
     x, y = grid.to_world(np.arange(-1, grid.rows + 1) + 0.5, np.arange(-1, grid.columns + 1) + 0.5)
-    # Rebind the name, so that an array that only the call held is released.
-    coverage = np.pad(coverage, 1)
+    padded = np.zeros((grid.rows + 2, grid.columns + 2))
+    padded[1:-1, 1:-1] = coverage
+    # An array that only the call held is released.
+    del coverage
     # Not contourpy.contour_generator, which takes longer to look for cells to leave out than to trace a small outline.
     no_mask: Any = None
     generator = contourpy.SerialContourGenerator(
         *np.meshgrid(x, y),
-        coverage.astype(np.float64),
+        padded,
         no_mask,
         corner_mask=True,
         line_type=contourpy.SerialContourGenerator.default_line_type,
