@@ -104,6 +104,7 @@ def _rotations_within(
     lines: NDArray[np.float64],
     shapes: NDArray[np.int64],
     order: NDArray[np.int64],
+    references: int,
     radius: float,
     tolerance: float,
     reach: float,
@@ -113,7 +114,7 @@ def _rotations_within(
     for place in range(len(order)):
         j = order[place]
         half = (lines[j, U1] - lines[j, U0]) / 2
-        for i in order[:place]:
+        for i in order[: min(place, references)]:
             if shapes[i] != shapes[j] or math.hypot(lines[i, OX] - lines[j, OX], lines[i, OY] - lines[j, OY]) > radius:
                 continue
             turn = rotation_between(angles[j], angles[i])
@@ -124,7 +125,7 @@ def _rotations_within(
 
 
 def adjust_within_shape(
-    lines: Boxes, shapes: NDArray[np.int64], *, radius: float, tolerance: float, reach: float
+    lines: Boxes, shapes: NDArray[np.int64], *, radius: float, tolerance: float, reach: float, share: float = 1.0
 ) -> NDArray[np.float64]:
     """Return the rotation of each line towards the longest line of its shape that is near it in place and direction.
 
@@ -137,13 +138,18 @@ def adjust_within_shape(
     reach : float
         Largest distance by which the rotation moves the ends of the line, pixels: a short line follows its shape by a
         large angle, a long one, whose direction is certain, by a small one.
+    share : float
+        Share of the lines, the longest first, that can be references.
 
     Returns
     -------
     ndarray, shape (n,)
         Radians; NaN for lines without such a longer line.
     """
-    rotation: NDArray[np.float64] = _rotations_within(lines, shapes, by_length(lines), radius, tolerance, reach)
+    references = math.ceil(share * len(lines))
+    rotation: NDArray[np.float64] = _rotations_within(
+        lines, shapes, by_length(lines), references, radius, tolerance, reach
+    )
     return rotation
 
 

@@ -27,6 +27,10 @@ from .segments import Segments
 
 __all__ = ["Original"]
 
+#: Distance by which an end of a line may be moved to follow its shape, point spacings: the edge of a mask is uncertain
+#: by as much, since half the diagonal of a square of four points is the farthest that a place can be from a point.
+_SHAPE_REACH = 0.7
+
 
 @dataclass(frozen=True, kw_only=True)
 class Original(LineDetector):
@@ -55,7 +59,7 @@ class Original(LineDetector):
     adjustment_reference: str = parameter(
         "shape", choices=("shape", "longer", "any", "none"),
         doc="reference lines of the adjustment: the longest line of the same black shape if that moves the ends by at "
-        "most a point spacing, otherwise longer lines nearby; longer lines nearby (the print sorts by length); all "
+        "most 0.7 point spacings, otherwise longer lines nearby; longer lines nearby (the print sorts by length); all "
         "lines nearby; or none: lines stay as fitted",
         source="2010, 3.3.2; reading; program",
     )  # fmt: skip
@@ -84,6 +88,12 @@ class Original(LineDetector):
         )
         if self.adjustment_reference != "shape":
             return nearby
-        reach = rasters.spacing / rasters.gsd
-        own = adjust_within_shape(segments.lines, segments.shapes, radius=radius, tolerance=tolerance, reach=reach)
+        own = adjust_within_shape(
+            segments.lines,
+            segments.shapes,
+            radius=radius,
+            tolerance=tolerance,
+            reach=_SHAPE_REACH * rasters.spacing / rasters.gsd,
+            share=self.adjustment_share,
+        )
         return np.where(np.isnan(own), nearby, own)

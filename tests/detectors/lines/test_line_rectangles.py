@@ -1,5 +1,7 @@
 """Adjustment, extension, rectangles and dominant colours."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from naive import lines as naive_lines
@@ -24,6 +26,8 @@ from roofbench.detectors.lines.initial_rectangles import (
     initial_rectangles,
     share_inside,
 )
+from roofbench.detectors.lines.original import Original
+from roofbench.detectors.lines.segments import Segments
 
 NONE = np.zeros((0, 1), dtype=np.int32)
 NOT_GREEN = np.zeros(1, dtype=np.bool_)
@@ -90,6 +94,25 @@ def test_a_line_follows_its_own_house_unless_that_moves_its_ends_too_far():
     np.testing.assert_allclose(np.degrees(found), [np.nan, -7, np.nan, np.nan, np.nan], atol=1e-9)
     found = adjust_within_shape(lines, shapes, radius=1e3, tolerance=np.pi / 8, reach=4.0)
     np.testing.assert_allclose(np.degrees(found), [np.nan, -7, -7, np.nan, -1], atol=1e-9)
+    # Of the longest fifth, the neighbour included, only the house itself is left.
+    found = adjust_within_shape(lines, shapes, radius=1e3, tolerance=np.pi / 8, reach=0.75, share=0.2)
+    np.testing.assert_allclose(np.degrees(found), [np.nan, -7, np.nan, np.nan, np.nan], atol=1e-9)
+    found = adjust_within_shape(lines[1:], shapes[1:], radius=1e3, tolerance=np.pi / 8, reach=4.0, share=0.25)
+    np.testing.assert_allclose(np.degrees(found), [np.nan] * 4)
+
+
+@pytest.mark.parametrize(("direction", "own", "longer"), [(96, -6, -1), (98, -3, -3)])
+def test_original_turns_a_line_to_its_house_within_the_certainty_of_its_ends_and_else_to_its_neighbours(
+    direction, own, longer
+):
+    # The house is at 0 degrees, its neighbours at 5; ends of a line of 12 m move by 0.63 and 0.84 m.
+    lines = np.array([line(0, 0, 0, 100), line(60, 0, 5, 90), line(30, 0, direction, 12), line(30, 9, 1, 11)])
+    segments = Segments(lines, np.array([1, 2, 1, 1]))
+    rasters = SimpleNamespace(gsd=1.0, spacing=1.0)
+    found = Original()._rotation(segments, rasters)
+    np.testing.assert_allclose(np.degrees(found), [0, 0, own, -1], atol=1e-9)
+    found = Original(adjustment_reference="longer")._rotation(segments, rasters)
+    np.testing.assert_allclose(np.degrees(found)[2], longer, atol=1e-9)
 
 
 def test_rotating_turns_a_line_about_its_centre():
