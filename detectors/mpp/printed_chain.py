@@ -28,10 +28,11 @@ from .printed_model import (
     TREE,
     WIDTH,
     PrintedModel,
+    PrintedPoints,
     X,
     Y,
     birth_log_ratio,
-    centre_log_ratio,
+    centre_log_ratios,
     death_log_ratio,
     log_posterior_gain,
     update_log_ratio,
@@ -171,12 +172,11 @@ def _draw_marks(new: Floats, schedule: PrintedSchedule, state: RandomState) -> N
 
 
 @kernel
-def _centre_accepted(new: Floats, old: Floats, table: Floats, model: PrintedModel, limit: float) -> bool:
+def _centre_accepted(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel, limit: float) -> bool:
     """Return whether equations 8 and 10, or 9 and 11, reach the limit."""
+    ratios = centre_log_ratios(new, old, points, model)
     for released in (GROUND, TREE):
-        least = centre_log_ratio(new, old, released, GROUND, table, model)
-        least = min(least, centre_log_ratio(new, old, released, TREE, table, model))
-        if least >= limit:
+        if min(ratios[released, GROUND], ratios[released, TREE]) >= limit:
             return True
     return False
 
@@ -208,14 +208,13 @@ def _permitted(
 
 @kernel
 def run_printed(
-    table: Floats, model: PrintedModel, schedule: PrintedSchedule, state: RandomState
+    points: PrintedPoints, model: PrintedModel, schedule: PrintedSchedule, state: RandomState
 ) -> tuple[Floats, Floats]:
     """Run the printed simulation.
 
     Parameters
     ----------
-    table : ndarray, shape (rows, columns + 1, 3)
-        Sum table of the points.
+    points : PrintedPoints
     model : PrintedModel
     schedule : PrintedSchedule
     state : ndarray of uint64
@@ -228,7 +227,7 @@ def run_printed(
     trace : ndarray, shape (rows, 11)
         See `PrintedTrace`; the energy is minus the log-posterior without the terms that no building changes.
     """
-    shape = (table.shape[0], table.shape[1] - 1)
+    shape = (points.table.shape[0], points.table.shape[1] - 1)
     buildings, gains = np.empty((schedule.capacity, 7)), np.empty(schedule.capacity)
     new = np.empty(7)
     limit = math.log(schedule.false_alarm_ratio)
@@ -239,7 +238,7 @@ def run_printed(
     trace = np.zeros((rows, PrintedTrace.COLUMNS))
     # Step 1: one building, drawn from the priors.
     if _draw_building(new, buildings[:0], shape, model, schedule, state):
-        buildings[0], gains[0] = new, log_posterior_gain(new, table, model)
+        buildings[0], gains[0] = new, log_posterior_gain(new, points, model)
         count, total = 1, gains[0]
     for t in range(schedule.iterations):
         row = t // schedule.stride
@@ -250,33 +249,33 @@ def run_printed(
             new[:] = buildings[i]
             if operation == Operation.UPDATE:
                 _draw_marks(new, schedule, state)
-                accepted = update_log_ratio(new, buildings[i], table, model) >= limit
+                accepted = update_log_ratio(new, buildings[i], points, model) >= limit
             else:
                 along, across = (uniform(state) - 0.5) * new[LENGTH], (uniform(state) - 0.5) * new[WIDTH]
                 cos, sin = math.cos(new[ANGLE]), math.sin(new[ANGLE])
                 new[X] += along * cos - across * sin
                 new[Y] += along * sin + across * cos
-                accepted = _centre_accepted(new, buildings[i], table, model, limit)
+                accepted = _centre_accepted(new, buildings[i], points, model, limit)
             trace[row, PrintedTrace.TRIED + operation] += 1
             if accepted and _permitted(new, buildings[:count], i, shape, model, schedule):
                 trace[row, PrintedTrace.ACCEPTED + operation] += 1
-                gain = log_posterior_gain(new, table, model)
+                gain = log_posterior_gain(new, points, model)
                 total += gain - gains[i]
                 buildings[i], gains[i] = new, gain
         if uniform(state) < schedule.birth_share:
             trace[row, PrintedTrace.TRIED + Operation.BIRTH] += 1
             if count < schedule.capacity and _draw_building(new, buildings[:count], shape, model, schedule, state):
-                ratio = min(birth_log_ratio(new, GROUND, table, model), birth_log_ratio(new, TREE, table, model))
+                ratio = min(birth_log_ratio(new, GROUND, points, model), birth_log_ratio(new, TREE, points, model))
                 if ratio >= limit and _permitted(new, buildings[:count], -1, shape, model, schedule):
                     trace[row, PrintedTrace.ACCEPTED + Operation.BIRTH] += 1
-                    buildings[count], gains[count] = new, log_posterior_gain(new, table, model)
+                    buildings[count], gains[count] = new, log_posterior_gain(new, points, model)
                     total += gains[count]
                     count += 1
         else:
             trace[row, PrintedTrace.TRIED + Operation.DEATH] += 1
             if count > 0:
                 i = integer(state, count)
-                if death_log_ratio(buildings[i], table, model) >= limit:
+                if death_log_ratio(buildings[i], points, model) >= limit:
                     trace[row, PrintedTrace.ACCEPTED + Operation.DEATH] += 1
                     total -= gains[i]
                     count -= 1

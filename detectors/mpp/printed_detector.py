@@ -29,7 +29,7 @@ from .cells import FEWEST_POINTS, cell_size, has_points
 from .mpp_steps import convergence_step
 from .parameters import check_sides
 from .printed_chain import Operation, PrintedSchedule, PrintedTrace, run_printed
-from .printed_model import ANGLE, NU, TAU, PrintedModel, sum_table
+from .printed_model import ANGLE, NU, TAU, PrintedModel, sorted_points
 from .random_stream import stream
 from .rectangles import to_world
 
@@ -243,7 +243,7 @@ class MPPPrinted(Detector):
         }
         ready = time.perf_counter()
         best, trace = run_printed(
-            sum_table(index, z - base, grid.shape),
+            sorted_points(index, z - base, grid.shape),
             self._model(gaussians, base, grid.gsd),
             self._schedule(grid.gsd, gaussians["ground"][0] - base),
             stream(entropy),

@@ -6,7 +6,7 @@ sums
     n, sum of z and sum of z2 of a set of points: all that a Gaussian likelihood needs.
 sum table
     Running sums from the west over the rows of a grid, shape (rows, columns + 1, 3), from which the sums of a rectangle
-    follow in one scan over its rows. A cell belongs to a rectangle when its centre does.
+    follow in one scan over its rows. A cell, with its points, belongs to a rectangle when its centre does.
 building
     x, y, length, width (cells), angle (radians), nu and tau (metres): a rectangle, and mean and standard deviation of
     the elevations of its roof.
@@ -37,18 +37,19 @@ __all__ = [
     "TREE",
     "WIDTH",
     "PrintedModel",
+    "PrintedPoints",
     "X",
     "Y",
     "birth_log_ratio",
     "building_sums",
-    "centre_log_ratio",
+    "centre_log_ratios",
     "common_sums",
     "death_log_ratio",
     "log_likelihood",
     "log_posterior_gain",
     "log_prior",
     "matching_share",
-    "sum_table",
+    "sorted_points",
     "update_log_ratio",
 ]
 
@@ -82,8 +83,26 @@ class PrintedModel(NamedTuple):
     union: bool
 
 
-def sum_table(index: NDArray[np.intp], z: Floats, shape: tuple[int, int]) -> Floats:
-    """Return the sum table of points.
+class PrintedPoints(NamedTuple):
+    """Points by the cells of a grid.
+
+    Attributes
+    ----------
+    table : ndarray, shape (rows, columns + 1, 3)
+        Sum table.
+    z : ndarray, shape (n,)
+        Elevations, cell by cell from the west, row by row from the north.
+    starts : ndarray of int64, shape (rows,)
+        Where each row begins in `z`.
+    """
+
+    table: Floats
+    z: Floats
+    starts: NDArray[np.int64]
+
+
+def sorted_points(index: NDArray[np.intp], z: Floats, shape: tuple[int, int]) -> PrintedPoints:
+    """Return points sorted into the cells of a grid.
 
     Parameters
     ----------
@@ -97,7 +116,8 @@ def sum_table(index: NDArray[np.intp], z: Floats, shape: tuple[int, int]) -> Flo
     sums = [np.bincount(index, weights=z**power, minlength=shape[0] * shape[1]) for power in range(3)]
     table = np.zeros((shape[0], shape[1] + 1, 3))
     table[:, 1:] = np.stack(sums, axis=-1).reshape(*shape, 3).cumsum(axis=1)
-    return table
+    ends = np.cumsum(table[:, -1, 0]).astype(np.int64)
+    return PrintedPoints(table, z[np.argsort(index, kind="stable")], np.concatenate([[0], ends[:-1]]))
 
 
 @kernel
@@ -151,14 +171,20 @@ def log_likelihood(sums: Floats, mean: float, spread: float) -> float:
 
 
 @kernel
-def matching_share(sums: Floats, nu: float, tau: float, match: float) -> float:
-    """Return n / N of equation 6: the share of points within `match` tau of nu, as of a Gaussian with these sums."""
-    if sums[0] < 0.5:
-        return 0.0
-    centre = sums[1] / sums[0]
-    width = math.sqrt(max(sums[2] / sums[0] - centre * centre, 1e-6)) * math.sqrt(2.0)
-    upper, lower = nu + match * tau - centre, nu - match * tau - centre
-    return 0.5 * (math.erf(upper / width) - math.erf(lower / width))
+def matching_share(building: Floats, points: PrintedPoints, match: float) -> float:
+    """Return n / N of equation 6: the share of the points in a building within `match` tau of nu; 0 without points."""
+    rows, columns = points.table.shape[0], points.table.shape[1] - 1
+    low, high = building[NU] - match * building[TAU], building[NU] + match * building[TAU]
+    matching, number = 0, 0
+    top, bottom = _rows(building, rows)
+    for row in range(top, bottom):
+        first, last = _span(building, row, columns)
+        begin = points.starts[row] + int(points.table[row, first, 0])
+        end = points.starts[row] + int(points.table[row, last, 0])
+        number += end - begin
+        for i in range(begin, end):
+            matching += low <= points.z[i] <= high
+    return matching / number if number > 0 else 0.0
 
 
 @kernel
@@ -171,30 +197,29 @@ def log_prior(building: Floats, prior: Floats) -> float:
 
 
 @kernel
-def _marks_log_ratio(new: Floats, old: Floats, after: Floats, before: Floats, model: PrintedModel) -> float:
+def _marks_log_ratio(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel) -> float:
     """Return the logarithm of P(B*) exp(n*/N*) / (P(B) exp(n/N)), which equations 6 and 8 to 11 share."""
     ratio = log_prior(new, model.prior) - log_prior(old, model.prior)
-    ratio += matching_share(after, new[NU], new[TAU], model.match)
-    return float(ratio - matching_share(before, old[NU], old[TAU], model.match))
+    return float(ratio + matching_share(new, points, model.match) - matching_share(old, points, model.match))
 
 
 @kernel
-def update_log_ratio(new: Floats, old: Floats, table: Floats, model: PrintedModel) -> float:
+def update_log_ratio(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel) -> float:
     """Return the logarithm of equation 6; minus infinity where the new window holds no point.
 
     As printed it compares the likelihoods of two different point sets. With `PrintedModel.union` points that only one
     of the windows holds count in the other state as the class that explains them better.
     """
     before, after, common = np.empty(3), np.empty(3), np.empty(3)
-    building_sums(old, table, before)
-    building_sums(new, table, after)
+    building_sums(old, points.table, before)
+    building_sums(new, points.table, after)
     if after[0] < 0.5:
         return -np.inf
     ratio = log_likelihood(after, new[NU], new[TAU]) - log_likelihood(before, old[NU], old[TAU])
     if model.union:
-        common_sums(new, old, table, common)
+        common_sums(new, old, points.table, common)
         ratio += _best_class(before - common, model.classes) - _best_class(after - common, model.classes)
-    return float(ratio + _marks_log_ratio(new, old, after, before, model))
+    return float(ratio + _marks_log_ratio(new, old, points, model))
 
 
 @kernel
@@ -205,40 +230,45 @@ def _best_class(sums: Floats, classes: Floats) -> float:
 
 
 @kernel
-def centre_log_ratio(new: Floats, old: Floats, released: int, taken: int, table: Floats, model: PrintedModel) -> float:
-    """Return the logarithm of one of equations 8 to 11; minus infinity where the new window holds no point.
+def centre_log_ratios(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel) -> Floats:
+    """Return the logarithms of equations 8 to 11, shape (2, 2); minus infinity where the new window holds no point.
+
+    Rows are the class of the points that the building leaves, columns that of those that it takes in: equation 8 is
+    (ground, ground), 9 (tree, ground), 10 (ground, tree), 11 (tree, tree).
 
     Parameters
     ----------
     new, old : ndarray, shape (7,)
         Building after and before.
-    released, taken : int
-        Class of the points that the building leaves and of those that it takes in: equation 8 is (ground, ground), 9
-        (tree, ground), 10 (ground, tree), 11 (tree, tree).
-    table : ndarray
+    points : PrintedPoints
     model : PrintedModel
     """
+    ratios = np.full((2, 2), -np.inf)
     before, after, common = np.empty(3), np.empty(3), np.empty(3)
-    building_sums(old, table, before)
-    building_sums(new, table, after)
+    building_sums(new, points.table, after)
     if after[0] < 0.5:
-        return -np.inf
-    common_sums(new, old, table, common)
+        return ratios
+    building_sums(old, points.table, before)
+    common_sums(new, old, points.table, common)
     gained, left = after - common, before - common
-    ratio = log_likelihood(gained, new[NU], new[TAU]) - log_likelihood(left, old[NU], old[TAU])
-    ratio += log_likelihood(left, model.classes[released, 0], model.classes[released, 1])
-    ratio -= log_likelihood(gained, model.classes[taken, 0], model.classes[taken, 1])
-    return float(ratio + _marks_log_ratio(new, old, after, before, model))
+    own = log_likelihood(gained, new[NU], new[TAU]) - log_likelihood(left, old[NU], old[TAU])
+    marks = _marks_log_ratio(new, old, points, model)
+    for released in (GROUND, TREE):
+        lost = own + log_likelihood(left, model.classes[released, 0], model.classes[released, 1])
+        for taken in (GROUND, TREE):
+            won = log_likelihood(gained, model.classes[taken, 0], model.classes[taken, 1])
+            ratios[released, taken] = lost - won + marks
+    return ratios
 
 
 @kernel
-def birth_log_ratio(building: Floats, other: int, table: Floats, model: PrintedModel) -> float:
+def birth_log_ratio(building: Floats, other: int, points: PrintedPoints, model: PrintedModel) -> float:
     """Return the logarithm of equation 14 (`other` ground) or 15 (tree), times the factor that equation 12 adds.
 
     Minus infinity where the window holds no point.
     """
     sums = np.empty(3)
-    building_sums(building, table, sums)
+    building_sums(building, points.table, sums)
     if sums[0] < 0.5:
         return -np.inf
     ratio = log_likelihood(sums, building[NU], building[TAU])
@@ -246,17 +276,17 @@ def birth_log_ratio(building: Floats, other: int, table: Floats, model: PrintedM
 
 
 @kernel
-def death_log_ratio(building: Floats, table: Floats, model: PrintedModel) -> float:
+def death_log_ratio(building: Floats, points: PrintedPoints, model: PrintedModel) -> float:
     """Return the logarithm of equation 16: the points of the building count as the class that explains them better."""
     sums = np.empty(3)
-    building_sums(building, table, sums)
+    building_sums(building, points.table, sums)
     return float(_best_class(sums, model.classes) - log_likelihood(sums, building[NU], building[TAU]) - model.log_birth)
 
 
 @kernel
-def log_posterior_gain(building: Floats, table: Floats, model: PrintedModel) -> float:
+def log_posterior_gain(building: Floats, points: PrintedPoints, model: PrintedModel) -> float:
     """Return what a building adds to the log-posterior of equation 3, without the Poisson term of their number."""
     sums = np.empty(3)
-    building_sums(building, table, sums)
+    building_sums(building, points.table, sums)
     gain = log_likelihood(sums, building[NU], building[TAU]) - _best_class(sums, model.classes)
     return float(gain + log_prior(building, model.prior))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 from naive import mpp as naive
+from naive import printed as naive_printed
 
 from roofbench import detect, make_scene
 from roofbench.core.errors import ParameterError
@@ -20,14 +21,14 @@ from roofbench.detectors.mpp.printed_model import (
     PrintedModel,
     birth_log_ratio,
     building_sums,
-    centre_log_ratio,
+    centre_log_ratios,
     common_sums,
     death_log_ratio,
     log_likelihood,
     log_posterior_gain,
     log_prior,
     matching_share,
-    sum_table,
+    sorted_points,
     update_log_ratio,
 )
 from roofbench.detectors.mpp.random_stream import stream
@@ -53,9 +54,9 @@ EMPTY = np.array([26.0, 4.0, 4.0, 2.0, 0.0, 6.0, 0.5])
 SHORTER = np.array([3.0, 4.0, 2.0, 2.0, 0.0, 5.5, 0.5])
 
 
-def table(points=Z):
-    index = np.array([row * COLUMNS + column for row, column in points])
-    return sum_table(index, np.array(list(points.values())), (ROWS, COLUMNS))
+def points_of(cells=Z):
+    index = np.array([row * COLUMNS + column for row, column in cells])
+    return sorted_points(index, np.array(list(cells.values())), (ROWS, COLUMNS))
 
 
 def log_normal(z, mean, spread):
@@ -69,16 +70,16 @@ def sums(*z):
 def test_the_sums_of_a_building_and_of_what_two_share_are_those_of_their_cells():
     rng = np.random.default_rng(0)
     index, z = rng.integers(0, 30 * 40, 3000), rng.normal(3, 4, 3000)
-    sums_of = sum_table(index, z, (30, 40))
+    points = sorted_points(index, z, (30, 40))
     found = np.empty(3)
     for _ in range(100):
         pair = np.column_stack(
             [rng.uniform(0, 40, 2), rng.uniform(0, 30, 2), rng.uniform(1, 25, (2, 2)), rng.uniform(0, 3, 2)]
         )
         one, other = (naive.cells_inside(rectangle, 30, 40).ravel()[index] for rectangle in pair)
-        building_sums(pair[0], sums_of, found)
+        building_sums(pair[0], points.table, found)
         np.testing.assert_allclose(found, [one.sum(), z[one].sum(), (z[one] ** 2).sum()], atol=1e-9)
-        common_sums(*pair, sums_of, found)
+        common_sums(*pair, points.table, found)
         both = one & other
         np.testing.assert_allclose(found, [both.sum(), z[both].sum(), (z[both] ** 2).sum()], atol=1e-9)
 
@@ -95,11 +96,16 @@ def test_equation_5_is_gaussian_in_length_width_nu_and_tau():
     assert log_prior(SHORTER, PRIOR) == pytest.approx(-2.03125)
 
 
-def test_the_share_of_matching_points_is_that_of_a_gaussian():
-    # All at 6, within 2 tau of nu; mean 5 m and spread 1 m against 6 m +- 1 m: between 0 and 2 standard deviations.
-    assert matching_share(sums(6, 6, 6), 6.0, 0.5, 2.0) == pytest.approx(1.0)
-    assert matching_share(sums(4, 6), 6.0, 0.5, 2.0) == pytest.approx(0.47725, abs=1e-5)
-    assert matching_share(sums(), 6.0, 0.5, 2.0) == 0.0
+def test_the_share_of_matching_points_counts_those_within_so_many_tau_of_nu():
+    # Six points at 6 m and two at 5 m; nu = 6 and tau = 0.5: all within 2 tau, six within 1.9 tau.
+    assert [matching_share(OLD, points_of(), match) for match in (2.0, 1.9)] == [1.0, 0.75]
+    # Its left half holds 6, 6, 6 and 5; within half a tau of 5.5 lies none.
+    assert [matching_share(SHORTER, points_of(), match) for match in (1.0, 0.5)] == [1.0, 0.0]
+    assert matching_share(EMPTY, points_of(), 2.0) == 0.0
+    # Two points of one cell, given in the order of neither cells nor rows.
+    two = sorted_points(np.array([25, 13, 25]), np.array([4.0, 6.0, 5.5]), (ROWS, COLUMNS))
+    both = np.array([4.5, 2.0, 4.0, 2.0, 0.0, 6.0, 0.5])
+    assert [matching_share(both, two, match) for match in (1.0, 0.5)] == [2 / 3, 1 / 3]
 
 
 def test_equation_6_as_printed_compares_the_likelihoods_of_two_point_sets():
@@ -108,19 +114,21 @@ def test_equation_6_as_printed_compares_the_likelihoods_of_two_point_sets():
     after = 3 * log_normal(6, 5.5, 0.5) + log_normal(5, 5.5, 0.5)
     assert before == pytest.approx(-5.80633, abs=1e-5)
     assert after == pytest.approx(-2.90317, abs=1e-5)
-    shares = [matching_share(sums(6, 6, 6, 5), 5.5, 0.5, 2.0), matching_share(sums(*Z.values()), 6.0, 0.5, 2.0)]
-    expected = after - before - 2.03125 + shares[0] - shares[1]
-    assert update_log_ratio(SHORTER, OLD, table(), MODEL) == pytest.approx(expected, abs=1e-9)
+    # All points match: n/N is 1 before and after. The prior falls by 2.03125.
+    assert update_log_ratio(SHORTER, OLD, points_of(), MODEL) == pytest.approx(0.87191, abs=1e-5)
+    # Within 0.9 tau match six of eight before and none after.
+    closer = MODEL._replace(match=0.9)
+    assert update_log_ratio(SHORTER, OLD, points_of(), closer) == pytest.approx(0.87191 - 0.75, abs=1e-5)
 
 
 def test_equation_6_over_the_union_counts_what_is_left_as_ground_or_tree():
-    printed = update_log_ratio(SHORTER, OLD, table(), MODEL)
+    printed = update_log_ratio(SHORTER, OLD, points_of(), MODEL)
     # Columns 4 and 5 are left: 5, 6, 6, 6, as trees.
     left = log_normal(5, 4, 2) + 3 * log_normal(6, 4, 2)
     assert left == pytest.approx(-8.07334, abs=1e-5)
-    union = update_log_ratio(SHORTER, OLD, table(), MODEL._replace(union=True))
+    union = update_log_ratio(SHORTER, OLD, points_of(), MODEL._replace(union=True))
     assert union - printed == pytest.approx(left)
-    assert update_log_ratio(OLD, SHORTER, table(), MODEL._replace(union=True)) == pytest.approx(-union)
+    assert update_log_ratio(OLD, SHORTER, points_of(), MODEL._replace(union=True)) == pytest.approx(-union)
 
 
 @pytest.mark.parametrize(
@@ -134,9 +142,9 @@ def test_equations_8_to_11(equation, released, taken):
     left = (log_normal(6, *CLASSES[released]) - log_normal(6, 6, 0.5)) * 3
     left += log_normal(5, *CLASSES[released]) - log_normal(5, 6, 0.5)
     gained = log_normal(1, 6, 0.5) - log_normal(1, *CLASSES[taken])
-    shares = matching_share(sums(5, 6, 6, 6, 1), 6.0, 0.5, 2.0) - matching_share(sums(*Z.values()), 6.0, 0.5, 2.0)
-    found = centre_log_ratio(SHIFTED, OLD, released, taken, table(points), MODEL)
-    assert found == pytest.approx(left + gained + shares, abs=1e-9)
+    # Of the points after the move, 5, 6, 6, 6 and 1, four match; of those before, all eight.
+    found = centre_log_ratios(SHIFTED, OLD, points_of(points), MODEL)[released, taken]
+    assert found == pytest.approx(left + gained - 0.2, abs=1e-9)
     by_hand = {8: -116.07944, 9: -53.97703, 10: -114.76129, 11: -52.65888}
     assert left + gained == pytest.approx(by_hand[equation], abs=1e-4)
 
@@ -144,26 +152,41 @@ def test_equations_8_to_11(equation, released, taken):
 def test_equations_12_to_15():
     # Eight points: -5.80633 under N(6, 0.5), 6 * (-18.91894) + 2 * (-13.41894) under the ground, -16.27182 under trees.
     own = 6 * log_normal(6, 6, 0.5) + 2 * log_normal(5, 6, 0.5)
-    ground = birth_log_ratio(OLD, GROUND, table(), MODEL)
-    tree = birth_log_ratio(OLD, TREE, table(), MODEL)
+    ground = birth_log_ratio(OLD, GROUND, points_of(), MODEL)
+    tree = birth_log_ratio(OLD, TREE, points_of(), MODEL)
     assert ground == pytest.approx(own + 6 * 18.918939 + 2 * 13.418939, abs=1e-4)
     assert tree == pytest.approx(own + 6 * 2.112086 + 2 * 1.737086, abs=1e-4)
-    # Equation 12 with b = 1/2 and d = 1/2 has the factor lambda b / d = lambda; equation 13 has d = lambda b and none.
-    with_lambda = MODEL._replace(log_birth=math.log(200 * 0.5 / 0.5))
-    assert birth_log_ratio(OLD, TREE, table(), with_lambda) - tree == pytest.approx(math.log(200))
-    assert birth_log_ratio(EMPTY, TREE, table(), MODEL) == -np.inf
+    assert (ground, tree) == pytest.approx((134.54518, 10.34036), abs=1e-4)
+    # Equation 12 has the factor lambda b / d.
+    with_lambda = MODEL._replace(log_birth=math.log(200))
+    assert birth_log_ratio(OLD, TREE, points_of(), with_lambda) == pytest.approx(10.34036 + 5.29832, abs=1e-4)
+    assert birth_log_ratio(EMPTY, TREE, points_of(), MODEL) == -np.inf
+
+
+def test_equation_12_becomes_13_where_deaths_are_lambda_times_as_frequent_as_births():
+    classes = {"ground": (0.0, 1.0), "tree": (4.0, 2.0), "nu": (6.0, 2.0)}
+
+    def factor(text):
+        return math.exp(make_detector(f"mpp-printed[{text}]")._model(classes, 0.0, 0.5).log_birth)
+
+    # d = lambda b leaves no factor. With b = d = 1/2 it is lambda, with b = 1/5 and d = 4/5 a quarter of it.
+    assert [factor(f"buildings={number}") for number in (1, 200)] == pytest.approx([1, 1])
+    assert factor("buildings=200,birth_share=0.5") == pytest.approx(200)
+    assert factor("buildings=200,birth_share=0.2") == pytest.approx(50)
 
 
 def test_equation_16_is_the_inverse_of_the_birth_that_would_bring_the_building_back():
-    births = [birth_log_ratio(OLD, other, table(), MODEL) for other in (GROUND, TREE)]
-    assert death_log_ratio(OLD, table(), MODEL) == pytest.approx(-min(births))
+    births = [birth_log_ratio(OLD, other, points_of(), MODEL) for other in (GROUND, TREE)]
+    assert death_log_ratio(OLD, points_of(), MODEL) == pytest.approx(-min(births))
+    # Trees explain the eight points better than the ground.
+    assert death_log_ratio(OLD, points_of(), MODEL) == pytest.approx(-10.34036, abs=1e-4)
     with_lambda = MODEL._replace(log_birth=1.5)
-    assert death_log_ratio(OLD, table(), with_lambda) == pytest.approx(-min(births) - 1.5)
+    assert death_log_ratio(OLD, points_of(), with_lambda) == pytest.approx(-min(births) - 1.5)
 
 
 def test_the_posterior_gains_what_a_birth_gains_and_the_prior():
-    births = [birth_log_ratio(SHORTER, other, table(), MODEL) for other in (GROUND, TREE)]
-    assert log_posterior_gain(SHORTER, table(), MODEL) == pytest.approx(min(births) + log_prior(SHORTER, PRIOR))
+    births = [birth_log_ratio(SHORTER, other, points_of(), MODEL) for other in (GROUND, TREE)]
+    assert log_posterior_gain(SHORTER, points_of(), MODEL) == pytest.approx(min(births) + log_prior(SHORTER, PRIOR))
 
 
 def schedule(**changes):
@@ -184,7 +207,7 @@ def schedule(**changes):
 
 
 def test_the_flow_chart_updates_moves_and_then_tries_a_birth_or_a_death():
-    _, trace = run_printed(table(), MODEL, schedule(), stream([1]))
+    _, trace = run_printed(points_of(), MODEL, schedule(), stream([1]))
     tried = trace[:, PrintedTrace.TRIED : PrintedTrace.ACCEPTED]
     held = np.concatenate([[1], trace[:-1, PrintedTrace.BUILDINGS]]) > 0
     np.testing.assert_array_equal(tried[:, Operation.UPDATE], held)
@@ -196,17 +219,34 @@ def test_the_flow_chart_updates_moves_and_then_tries_a_birth_or_a_death():
     np.testing.assert_array_equal(np.cumsum(change) + 1, trace[:, PrintedTrace.BUILDINGS])
 
 
+@pytest.mark.parametrize("changes", [{}, {"false_alarm_ratio": 0.9, "birth_share": 0.7}, {"union": True}])
+def test_the_simulation_is_that_of_the_equations_term_by_term_in_the_order_of_the_flow_chart(changes):
+    rng = np.random.default_rng(3)
+    index = np.repeat(np.arange(ROWS * COLUMNS), rng.integers(0, 4, ROWS * COLUMNS))
+    row, column = np.divmod(index, COLUMNS)
+    roof = (row > 1) & (row < 6) & (column > 2) & (column < 8)
+    z = np.where(roof, rng.normal(6, 0.4, len(index)), rng.normal(0, 1, len(index)))
+    changes = dict(changes)
+    model = MODEL._replace(union=changes.pop("union", False), log_birth=0.4)
+    plan = schedule(iterations=150, **changes)
+    best, trace = run_printed(sorted_points(index, z, (ROWS, COLUMNS)), model, plan, stream([5]))
+    expected, accepted = naive_printed.run(index, z, (ROWS, COLUMNS), model, plan, stream([5]))
+    np.testing.assert_array_equal(trace[:, PrintedTrace.ACCEPTED :], accepted)
+    assert (accepted.sum(axis=0) > 0).all()
+    np.testing.assert_allclose(best, expected, atol=1e-9)
+
+
 def test_the_best_state_has_the_highest_posterior_of_all_that_were_visited():
     for seed in range(5):
-        best, trace = run_printed(table(), MODEL, schedule(buildings=3.0), stream([seed]))
-        value = sum(log_posterior_gain(building, table(), MODEL) for building in best)
+        best, trace = run_printed(points_of(), MODEL, schedule(buildings=3.0), stream([seed]))
+        value = sum(log_posterior_gain(building, points_of(), MODEL) for building in best)
         value += len(best) * math.log(3.0) - math.lgamma(len(best) + 1)
         assert -value == pytest.approx(trace[:, PrintedTrace.ENERGY].min(), abs=1e-6)
 
 
 def states(**changes):
     """Buildings of the best states of some runs, and those that overlap in pairs."""
-    runs = [run_printed(table(), MODEL, schedule(**changes), stream([seed]))[0] for seed in range(8)]
+    runs = [run_printed(points_of(), MODEL, schedule(**changes), stream([seed]))[0] for seed in range(8)]
     pairs = [pair for best in runs for pair in combinations(best, 2) if overlap_area(*pair) > 0]
     return np.concatenate(runs), pairs
 
