@@ -174,11 +174,10 @@ def _draw_marks(new: Floats, schedule: PrintedSchedule, state: RandomState) -> N
 @kernel
 def _centre_accepted(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel, limit: float) -> bool:
     """Return whether equations 8 and 10, or 9 and 11, reach the limit."""
-    ratios = centre_log_ratios(new, old, points, model)
-    for released in (GROUND, TREE):
-        if min(ratios[released, GROUND], ratios[released, TREE]) >= limit:
-            return True
-    return False
+    ratios = centre_log_ratios(new, old, points, model, limit)
+    left_as_ground = min(ratios[GROUND, GROUND], ratios[GROUND, TREE])
+    left_as_trees = min(ratios[TREE, GROUND], ratios[TREE, TREE])
+    return bool(max(left_as_ground, left_as_trees) >= limit)
 
 
 @kernel
@@ -249,7 +248,7 @@ def run_printed(
             new[:] = buildings[i]
             if operation == Operation.UPDATE:
                 _draw_marks(new, schedule, state)
-                accepted = update_log_ratio(new, buildings[i], points, model) >= limit
+                accepted = update_log_ratio(new, buildings[i], points, model, limit) >= limit
             else:
                 along, across = (uniform(state) - 0.5) * new[LENGTH], (uniform(state) - 0.5) * new[WIDTH]
                 cos, sin = math.cos(new[ANGLE]), math.sin(new[ANGLE])

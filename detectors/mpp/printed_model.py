@@ -197,15 +197,25 @@ def log_prior(building: Floats, prior: Floats) -> float:
 
 
 @kernel
-def _marks_log_ratio(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel) -> float:
-    """Return the logarithm of P(B*) exp(n*/N*) / (P(B) exp(n/N)), which equations 6 and 8 to 11 share."""
+def _marks_log_ratio(
+    new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel, rest: float, limit: float
+) -> float:
+    """Return the logarithm of P(B*) exp(n*/N*) / (P(B) exp(n/N)), which equations 6 and 8 to 11 share.
+
+    Minus infinity where it and the rest of the ratio do not reach a limit whatever the shares n/N are, which then need
+    not be counted.
+    """
     ratio = log_prior(new, model.prior) - log_prior(old, model.prior)
+    if rest + ratio + 1.0 < limit:
+        return -np.inf
     return float(ratio + matching_share(new, points, model.match) - matching_share(old, points, model.match))
 
 
 @kernel
-def update_log_ratio(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel) -> float:
+def update_log_ratio(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel, limit: float) -> float:
     """Return the logarithm of equation 6; minus infinity where the new window holds no point.
+
+    It may be minus infinity, too, where it is below a limit.
 
     As printed it compares the likelihoods of two different point sets. With `PrintedModel.union` points that only one
     of the windows holds count in the other state as the class that explains them better.
@@ -219,7 +229,7 @@ def update_log_ratio(new: Floats, old: Floats, points: PrintedPoints, model: Pri
     if model.union:
         common_sums(new, old, points.table, common)
         ratio += _best_class(before - common, model.classes) - _best_class(after - common, model.classes)
-    return float(ratio + _marks_log_ratio(new, old, points, model))
+    return float(ratio + _marks_log_ratio(new, old, points, model, ratio, limit))
 
 
 @kernel
@@ -230,7 +240,7 @@ def _best_class(sums: Floats, classes: Floats) -> float:
 
 
 @kernel
-def centre_log_ratios(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel) -> Floats:
+def centre_log_ratios(new: Floats, old: Floats, points: PrintedPoints, model: PrintedModel, limit: float) -> Floats:
     """Return the logarithms of equations 8 to 11, shape (2, 2); minus infinity where the new window holds no point.
 
     Rows are the class of the points that the building leaves, columns that of those that it takes in: equation 8 is
@@ -242,6 +252,8 @@ def centre_log_ratios(new: Floats, old: Floats, points: PrintedPoints, model: Pr
         Building after and before.
     points : PrintedPoints
     model : PrintedModel
+    limit : float
+        Where all are below it they may be minus infinity, too.
     """
     ratios = np.full((2, 2), -np.inf)
     before, after, common = np.empty(3), np.empty(3), np.empty(3)
@@ -252,12 +264,12 @@ def centre_log_ratios(new: Floats, old: Floats, points: PrintedPoints, model: Pr
     common_sums(new, old, points.table, common)
     gained, left = after - common, before - common
     own = log_likelihood(gained, new[NU], new[TAU]) - log_likelihood(left, old[NU], old[TAU])
-    marks = _marks_log_ratio(new, old, points, model)
     for released in (GROUND, TREE):
         lost = own + log_likelihood(left, model.classes[released, 0], model.classes[released, 1])
         for taken in (GROUND, TREE):
             won = log_likelihood(gained, model.classes[taken, 0], model.classes[taken, 1])
-            ratios[released, taken] = lost - won + marks
+            ratios[released, taken] = lost - won
+    ratios += _marks_log_ratio(new, old, points, model, ratios.max(), limit)
     return ratios
 
 

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from naive.mpp import cells_inside
 
+from naive.mpp import cells_inside
 from roofbench.detectors.mpp.random_stream import gaussian, integer, uniform
 
 #: Columns of a building and of its priors and steps.

@@ -115,20 +115,20 @@ def test_equation_6_as_printed_compares_the_likelihoods_of_two_point_sets():
     assert before == pytest.approx(-5.80633, abs=1e-5)
     assert after == pytest.approx(-2.90317, abs=1e-5)
     # All points match: n/N is 1 before and after. The prior falls by 2.03125.
-    assert update_log_ratio(SHORTER, OLD, points_of(), MODEL) == pytest.approx(0.87191, abs=1e-5)
+    assert update_log_ratio(SHORTER, OLD, points_of(), MODEL, -np.inf) == pytest.approx(0.87191, abs=1e-5)
     # Within 0.9 tau match six of eight before and none after.
     closer = MODEL._replace(match=0.9)
-    assert update_log_ratio(SHORTER, OLD, points_of(), closer) == pytest.approx(0.87191 - 0.75, abs=1e-5)
+    assert update_log_ratio(SHORTER, OLD, points_of(), closer, -np.inf) == pytest.approx(0.87191 - 0.75, abs=1e-5)
 
 
 def test_equation_6_over_the_union_counts_what_is_left_as_ground_or_tree():
-    printed = update_log_ratio(SHORTER, OLD, points_of(), MODEL)
+    printed = update_log_ratio(SHORTER, OLD, points_of(), MODEL, -np.inf)
     # Columns 4 and 5 are left: 5, 6, 6, 6, as trees.
     left = log_normal(5, 4, 2) + 3 * log_normal(6, 4, 2)
     assert left == pytest.approx(-8.07334, abs=1e-5)
-    union = update_log_ratio(SHORTER, OLD, points_of(), MODEL._replace(union=True))
+    union = update_log_ratio(SHORTER, OLD, points_of(), MODEL._replace(union=True), -np.inf)
     assert union - printed == pytest.approx(left)
-    assert update_log_ratio(OLD, SHORTER, points_of(), MODEL._replace(union=True)) == pytest.approx(-union)
+    assert update_log_ratio(OLD, SHORTER, points_of(), MODEL._replace(union=True), -np.inf) == pytest.approx(-union)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_equations_8_to_11(equation, released, taken):
     left += log_normal(5, *CLASSES[released]) - log_normal(5, 6, 0.5)
     gained = log_normal(1, 6, 0.5) - log_normal(1, *CLASSES[taken])
     # Of the points after the move, 5, 6, 6, 6 and 1, four match; of those before, all eight.
-    found = centre_log_ratios(SHIFTED, OLD, points_of(points), MODEL)[released, taken]
+    found = centre_log_ratios(SHIFTED, OLD, points_of(points), MODEL, -np.inf)[released, taken]
     assert found == pytest.approx(left + gained - 0.2, abs=1e-9)
     by_hand = {8: -116.07944, 9: -53.97703, 10: -114.76129, 11: -52.65888}
     assert left + gained == pytest.approx(by_hand[equation], abs=1e-4)
