@@ -51,8 +51,11 @@ def detect(scene: Scene | str | Path, detector: str | Detector, *, seed: int = 0
     InputError
         The detector returned what is no set of footprints of this scene.
     """
-    place = scene if isinstance(scene, Scene) else scenes_of([str(scene)])[0].open()
-    return _detect(place, make_detector(detector, parameters), seed=seed)
+    chosen = make_detector(detector, parameters)
+    if isinstance(scene, Scene):
+        return _detect(scene, chosen, seed=seed)
+    (recipe,) = scenes_of([str(scene)])
+    return _detect(recipe.open(), chosen, seed=seed, name=recipe.name)
 
 
 def run(

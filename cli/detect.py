@@ -134,7 +134,7 @@ def detect(
     if output is not None:
         started = processor_time()
         with _failures_reported(chosen, place):
-            found = run_detector(place, chosen, seed=seed)
+            found = run_detector(place, chosen, seed=seed, name=recipe.name)
         seconds = processor_time() - started
         write_footprints(found, output, overwrite=overwrite)
         if not quiet:

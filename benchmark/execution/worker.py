@@ -54,15 +54,23 @@ _ahead = ReadAhead()
 _MANY, _PART = 200_000, 100_000
 
 
-def detect(scene: Scene, detector: Detector, *, seed: int = 0, stream: np.random.Generator | None = None) -> Footprints:
+def detect(
+    scene: Scene,
+    detector: Detector,
+    *,
+    seed: int = 0,
+    stream: np.random.Generator | None = None,
+    name: str | None = None,
+) -> Footprints:
     """Return a detector's checked footprints on a scene; the random stream follows from seed, scene and detector.
 
-    A part of a scene has a `stream` of its own. The detector runs in this process.
+    A part of a scene has a `stream` of its own. `name` is that of the scene in tables, which that of the scene itself
+    may differ from: ``knox-1[tree_density=10]``. The detector runs in this process.
     """
     scene.require(detector.requires)
     visible = scene.for_detection()
     if type(detector) is Precomputed:  # no subclass: a plugin must not learn the name
-        found = detector.footprints_of(scene.name, visible)
+        found = detector.footprints_of(name or scene.name, visible)
         facts: Mapping[str, Any] = found.metadata
     else:
         rng = random_stream(seed, scene.name, detector.name) if stream is None else stream
@@ -75,12 +83,12 @@ def detect(scene: Scene, detector: Detector, *, seed: int = 0, stream: np.random
 class _Here:
     """A detector that runs in this process."""
 
-    def __init__(self, detector: Detector) -> None:
-        self.detector, self.declaration = detector, Declaration.of(detector)
+    def __init__(self, detector: Detector, name: str | None = None) -> None:
+        self.detector, self.declaration, self._name = detector, Declaration.of(detector), name
 
     def detect(self, scene: Scene, stream: np.random.Generator) -> tuple[Footprints, Cost]:
         watch = Stopwatch.start()
-        found = detect(scene, self.detector, stream=stream)
+        found = detect(scene, self.detector, stream=stream, name=self._name)
         return found, Cost(**watch.read())
 
 
@@ -145,7 +153,7 @@ def execute(
         scene = scene if scene is not None else _opened(task.scene)
         runs: _Here | _Apart
         if detector is not None or apart is None or _runs_here(task):
-            runs = _Here(detector if detector is not None else task.detector.detector())
+            runs = _Here(detector if detector is not None else task.detector.detector(), task.scene.name)
         else:
             runs = _Apart(apart.of(task.detector), task.detector)
         if evaluators is None:

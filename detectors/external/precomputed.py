@@ -89,12 +89,13 @@ class Precomputed(Detector):
 
 
 def file_stem(scene: str) -> str:
-    """Return the name of a scene as a file or folder is called.
+    """Return the name of a scene as a file or folder is called; a generated scene writes 40 as 40.0.
 
-    >>> file_stem("knox-small-3[tree_density=40,scene.slope=5]")
+    >>> file_stem("knox-small-3[tree_density=40.0,scene.slope=5]")
     'knox-small-3_tree_density=40,scene.slope=5'
     """
-    return re.sub(r"[^\w.,=+-]+", "_", scene).strip("_")
+    short = re.sub(r"(=-?\d+)\.0(?=[],])", r"\1", scene)
+    return re.sub(r"[^\w.,=+-]+", "_", short).strip("_")
 
 
 def vector_files(folder: Path) -> list[Path]:

@@ -9,6 +9,7 @@ import shapely
 from harness.command_line import roofbench
 
 import roofbench as rb
+from roofbench.benchmark.suite import read_suite
 from roofbench.detectors.external.precomputed import Precomputed, file_stem
 from roofbench.scenes.builtin import hamlet
 
@@ -130,3 +131,21 @@ def test_a_subclass_does_not_learn_the_name_of_the_scene(place):
 
     with pytest.raises(rb.RoofbenchError, match="found by the name of a scene"):
         rb.detect(hamlet(1), Sly(folder=str(place / "mine")))
+
+
+@pytest.mark.parametrize("axis", ["tree_density = [0, 7.5]", "width = 60"])
+def test_files_are_found_by_the_name_of_a_generated_scene_in_tables(tmp_path, axis):
+    """The scene itself is called otherwise: ``tree_density=0.0``, and without the mark that a name as this one needs."""
+    preset = "fairfield" if axis.startswith("width") else "fairfield-1-small"
+    (tmp_path / "my.toml").write_text(f'[[scenes]]\npreset = "{preset}"\nseeds = [1]\nbuildings = 1\nheight = 60\n{axis}\n')
+    suite = read_suite(tmp_path / "my.toml")
+    (tmp_path / "mine").mkdir()
+    for recipe in suite.scenes:
+        place = recipe.open()
+        rb.write_footprints(place.reference, tmp_path / "mine" / f"{file_stem(recipe.name)}.gpkg")
+        found = rb.detect(recipe.word, f"precomputed[folder={tmp_path / 'mine'}]")
+        assert found.areas.tolist() == place.reference.areas.tolist()
+        if "@" not in recipe.name:
+            assert len(rb.detect(place, f"precomputed[folder={tmp_path / 'mine'}]")) == len(found)
+    answer = roofbench("score", "--footprints", "mine", "--suite", "my.toml", "-f", "json", folder=tmp_path)
+    assert rows(answer)["precomputed:mine"]["scenes"] == len(suite.scenes)
