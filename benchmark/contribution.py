@@ -14,10 +14,9 @@ from ..core.errors import OutputError, RoofbenchError
 from ..core.output import check_folder
 from ..detectors.checks import checked_output
 from ..detectors.external.precomputed import Precomputed, file_stem, unknown_files
-from ..scenes.folder import SCENE_FILES, open_scene, save_scene
+from ..scenes.folder import SCENE_FILES, save_scene
 from ..scenes.scene import Scene
 from .analysis.report_contents import newest_runs
-from .identity.recipes import SceneRecipe
 from .store.records import RunRow
 from .store.writer import Store
 from .suite import DetectorEntry, Suite
@@ -62,19 +61,14 @@ def runs_beside(store: Store, contributed: Sequence[RunRow]) -> list[RunRow]:
 
 
 def contribution_problems(suite: Suite, folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield the name of each scene with what is wrong with its file (empty: nothing), then of each unknown file.
-
-    Scenes in folders are opened to compare CRS and extent; synthetic scenes are not generated for that.
-    """
+    """Yield the name of each scene with what is wrong with its file (empty: nothing), then of each unknown file."""
     detector = Precomputed(folder=str(folder))
     for scene in suite.scenes:
         try:
-            if isinstance(scene, SceneRecipe) and scene.kind == "folder":
-                place = open_scene(scene.place)
-            else:
-                place = scene if isinstance(scene, Scene) else Scene(scene.name, (-1e9, -1e9, 1e9, 1e9))
-            bare = Scene(place.name, place.extent, crs=place.crs)
-            checked_output(detector.footprints_of(scene.name, bare), bare, detector.file_of(scene.name).name)
+            # Opened for its CRS and extent; its measurements are neither read nor generated.
+            place = scene if isinstance(scene, Scene) else scene.open()
+            found = detector.footprints_of(scene.name, place.crs)
+            checked_output(found, place, detector.file_of(scene.name).name)
         except RoofbenchError as error:
             yield scene.name, str(error)
         else:

@@ -63,7 +63,13 @@ def clean_environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
 
 
 def start_python(
-    code: str, *, path: str, folder: str, errors: IO[bytes] | int | None, own_session: bool = False
+    code: str,
+    *,
+    path: str,
+    folder: str,
+    errors: IO[bytes] | int | None,
+    own_session: bool = False,
+    environment: Mapping[str, str] | None = None,
 ) -> subprocess.Popen[bytes]:
     """Start this Python with a clean environment; messages go through its standard input and output.
 
@@ -79,6 +85,8 @@ def start_python(
         Where its standard error goes.
     own_session : bool, default False
         Whether Ctrl-C in the terminal does not reach it.
+    environment : mapping, optional
+        Variables beside those of `clean_environment`.
     """
     return subprocess.Popen(  # noqa: S603 - our own interpreter with our own code
         # -P: the working directory must not come before the given path, which may hold older code.
@@ -86,7 +94,7 @@ def start_python(
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=errors,
-        env=clean_environment({"PYTHONPATH": path}),
+        env=clean_environment({**(environment or {}), "PYTHONPATH": path}),
         cwd=folder,
         start_new_session=own_session,
     )

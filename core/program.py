@@ -119,11 +119,12 @@ def run_program(
 
 
 def log_tail(log: Path) -> str:
-    """Return the end of a log as text."""
-    with log.open("rb") as stream:
+    """Return the end of a log as text; empty where the program removed it."""
+    with suppress(FileNotFoundError), log.open("rb") as stream:
         stream.seek(0, os.SEEK_END)
         stream.seek(max(0, stream.tell() - _TAIL))
         return stream.read().decode(errors="replace").strip()
+    return ""
 
 
 def _exceeded(limits: Limits, seconds: float, peak: int) -> str:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...core.errors import OutputError, RoofbenchError
+from ...detectors.external.precomputed import Precomputed
 from ...evaluators.base import Evaluator
 from ...scenes.scene import Scene
 from ..plan import PlannedRun, scene_recipe
@@ -27,9 +28,13 @@ __all__ = ["forget_tiles", "is_city_run", "run_city"]
 
 
 def is_city_run(run: PlannedRun) -> bool:
-    """Return whether a run is computed tile by tile by all workers: on a city, by a detector that others can make."""
-    portable = not run.identity.detector.use.startswith("(this process)")
-    return not isinstance(run.scene, Scene) and run.scene.tile > 0 and portable
+    """Return whether a run is computed tile by tile by all workers: on a city, by a detector that others can make.
+
+    Footprints made elsewhere are read whole.
+    """
+    use = run.identity.detector.use
+    in_tiles = use != Precomputed.name and not use.startswith("(this process)")
+    return not isinstance(run.scene, Scene) and run.scene.tile > 0 and in_tiles
 
 
 def run_city(

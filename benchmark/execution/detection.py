@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import tempfile
 import traceback
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,6 +57,7 @@ def serve_detectors() -> None:
     """Answer requests from standard input until it closes: the main function of a detector process."""
     inward, outward = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # output of a detector must not mix with the messages
+    tempfile.tempdir = str(Path.cwd())  # removed with the working folder when this process is killed
     requests = listen(inward, receive_parts)
     detectors: dict[str, Detector] = {}
     layers: tuple[Mapping[str, Any], list[NDArray[Any]]] = {}, []

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import faulthandler
 import os
+import secrets
 import subprocess
 import sys
 import tempfile
@@ -29,6 +30,7 @@ from ...core.processes import (
     Limits,
     death_reason,
     end_children,
+    end_marked,
     end_tree,
     memory_reason,
     start_python,
@@ -43,6 +45,8 @@ __all__ = ["IsolatedProcess", "call_isolated", "close_isolated", "serve"]
 
 _PACKAGE = __package__
 _START = f"from {_PACKAGE}.isolation import serve; serve()"
+#: Variable that a worker and all that it starts have in their environment, with a random value.
+_MARK = "ROOFBENCH_WORKER"
 _WATCH_EVERY = 0.05  # seconds between two checks of a worker with a memory limit
 _LOOK_EVERY = 0.5  # seconds between two checks of any other worker
 _PATIENCE = 5.0  # seconds for a worker to end itself
@@ -57,6 +61,7 @@ class IsolatedProcess:
         self._errors: IO[bytes] | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._detected: bytes | None = None
+        self._mark = secrets.token_hex(16)
 
     def call(self, task: str, limits: Limits) -> bytes:
         """Run a task and return its outcome as bytes; a crash or an exceeded limit is a failed outcome."""
@@ -107,6 +112,7 @@ class IsolatedProcess:
             with suppress(OSError):
                 process.kill()
             process.wait()
+            end_marked(_MARK, self._mark)  # daemons that programs of detectors started are nobody's children
             if self._folder is not None:
                 self._folder.cleanup()
             for stream in (process.stdin, process.stdout, self._errors):
@@ -143,7 +149,12 @@ class IsolatedProcess:
             self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
             # Ctrl-C reaches the caller only, which ends its workers.
             self._process = start_python(
-                _START, path=path, folder=self._folder.name, errors=self._errors, own_session=True
+                _START,
+                path=path,
+                folder=self._folder.name,
+                errors=self._errors,
+                own_session=True,
+                environment={_MARK: self._mark},
             )
         return self._process
 

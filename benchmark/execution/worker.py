@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 from shapely import Geometry
 
-from ...core.errors import InputError, MissingInputError
+from ...core.errors import InputError, MissingInputError, UnsupportedError
 from ...core.memory import reset_highest_memory
 from ...core.plain_values import plain_value
 from ...core.wording import counted
@@ -68,11 +68,11 @@ def detect(
     may differ from: ``knox-1[tree_density=10]``. The detector runs in this process.
     """
     scene.require(detector.requires)
-    visible = scene.for_detection()
     if type(detector) is Precomputed:  # no subclass: a plugin must not learn the name
-        found = detector.footprints_of(name or scene.name, visible)
+        found = detector.footprints_of(name or scene.name, scene.crs)
         facts: Mapping[str, Any] = found.metadata
     else:
+        visible = scene.for_detection()
         rng = random_stream(seed, scene.name, detector.name) if stream is None else stream
         found, facts = detect_on(detector, visible, rng)
     found = checked_output(found, scene, detector.name)
@@ -106,8 +106,8 @@ class _Apart:
 def _runs_here(task: Task) -> bool:
     """Return whether a task is run in the process that opens scenes.
 
-    Footprints made elsewhere are found by the name of the scene. A city that is one task is timed by the gate
-    and not evaluated.
+    Footprints made elsewhere are found by the name of the scene, and read whole. A city that is one task is timed by
+    the gate and not evaluated.
     """
     return task.detector.use == Precomputed.name or (task.scene.tile > 0 and task.part is None and not task.tiles)
 
@@ -160,6 +160,8 @@ def execute(
             evaluators = [recipe.evaluator() for recipe in task.evaluators]
         if task.part is None:
             _refuse_incomplete(scene)
+        elif task.detector.use == Precomputed.name:
+            raise UnsupportedError("precomputed footprints are those of a whole scene: detect without tiles")
         is_city = task.part is None and task.scene.tile > 0
         record = describe(scene, is_city=is_city) if task.describe_scene else None
         whole = scene
@@ -175,7 +177,7 @@ def execute(
         watch = Stopwatch.start()
         if is_city and task.tiles:
             found, cost = _joined_city(scene, runs.declaration, task)
-        elif is_city:
+        elif is_city and task.detector.use != Precomputed.name:
             assert isinstance(runs, _Here)
             found, cost = _detect_city(scene, runs.detector, task.seed, task.scene.tile), Cost(**watch.read())
         elif task.part is None:

@@ -14,6 +14,7 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -30,7 +31,7 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.las_files import write_points
 from ...scenes.scene import INPUTS, Scene
 from ..base import Detector
-from .external_paths import absolute_words, content_digest, split_words
+from .external_paths import absolute_words, content_digest, path_in, split_words
 from .program_output import read_output
 from .recipe_list import RECIPES
 
@@ -85,7 +86,7 @@ class Command(Detector):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if bool(self.run) == bool(self.recipe):
+        if bool(self.run.strip()) == bool(self.recipe):
             raise ParameterError("command: give either run (a program with its arguments) or recipe")
         given = _settings(self.settings)
         inputs = tuple(self.inputs.split())
@@ -101,7 +102,7 @@ class Command(Detector):
                 "command: the value 'seed' is set by the run: set seeded=true and choose the seeds there"
             )
         for word in split_words(self.files, "files"):
-            if not Path(word).exists():
+            if not os.path.exists(word):
                 raise ParameterError(f"command: files names {word}, which does not exist")
         if self.run:
             program = split_words(self.run, "run")[0]
@@ -124,14 +125,14 @@ class Command(Detector):
         else:
             words = split_words(self.run, "run")
             programs = (words[0],)
-            paths += [Path(word) for word in words[1:] if os.path.isabs(word) and Path(word).exists()]
+            paths += filter(None, map(path_in, words[1:]))
         paths += [Path(found) for program in programs if (found := shutil.which(program))]
         return content_digest(paths) + "".join(f" {name} {_version(name)}" for name in packages)
 
     def code_files(self) -> tuple[Path, ...]:
         """Return the program, the files among its arguments and those of `files`, but no installed program."""
-        paths = [Path(word) for word in (*split_words(self.run, "run"), *split_words(self.files, "files"))]
-        found = [path for path in paths if path.is_absolute() and path.exists()]
+        words = (*split_words(self.run, "run"), *split_words(self.files, "files"))
+        found = filter(None, map(path_in, words))
         return tuple(path for path in found if shutil.which(path.name) != str(path))
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
@@ -146,8 +147,7 @@ class Command(Detector):
             save_scene(scene, folder / "scene")
             _write_points(scene, folder / "scene" / f"points.{self.points}")
             seeds = {} if seed is None else {"seed": seed}
-            # One value a line: a shell script reads them by sed.
-            parameters.write_text(json.dumps({**_settings(self.settings), **seeds}, indent=1) + "\n", encoding="utf-8")
+            _write_parameters({**_settings(self.settings), **seeds}, parameters)
             _hide_times(folder)
             command, environment = self._command(folder / "scene", parameters, output)
             most = int(self.size_limit * 1e6)
@@ -193,10 +193,20 @@ def _settings(text: str) -> dict[str, Any]:
         if not equals or not name:
             raise ParameterError(f"command: settings must be written NAME=VALUE, separated by spaces, not {word!r}")
         try:
-            values[name] = json.loads(value)
-        except json.JSONDecodeError:
+            values[name] = json.loads(value, parse_constant=_refuse_constant)
+        except ValueError:
             values[name] = value
     return values
+
+
+def _refuse_constant(text: str) -> None:
+    raise ValueError(f"{text} is not JSON")  # Python reads NaN, other languages do not
+
+
+def _write_parameters(values: Mapping[str, Any], file: Path) -> None:
+    """Write values as JSON, one per line: a shell script reads them by sed."""
+    lines = [f" {json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in values.items()]
+    file.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 
 def _write_points(scene: Scene, file: Path) -> None:

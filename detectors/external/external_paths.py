@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 import os
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ __all__ = [
     "content_digest",
     "files_of",
     "moved_words",
+    "path_in",
     "split_words",
     "with_absolute_paths",
     "with_relative_paths",
@@ -41,20 +43,46 @@ def split_words(text: str, parameter: str) -> list[str]:
         raise ParameterError(f"{parameter} cannot be split into words: {error}: {text!r}") from error
 
 
+def path_in(word: str) -> Path | None:
+    """Return the absolute path of what exists that a word names: alone, or after ``=`` as in ``--model=/trees.pt``."""
+    for text in (word, word.partition("=")[2]):
+        if os.path.isabs(text) and os.path.exists(text):
+            return Path(text)
+    return None
+
+
 def absolute_words(text: str, parameter: str, folder: Path) -> str:
-    """Return a text of words in which those that name a file or folder are absolute paths."""
+    """Return a text of words in which those that name a file or folder are absolute paths.
+
+    The program at the head of `run` is searched as by a shell: a name without a slash is that of an installed program
+    where there is one.
+    """
+
+    def absolute(path: str) -> str | None:
+        return os.path.abspath(folder / path) if os.path.exists(folder / path) else None
+
     words = split_words(text, parameter)
-    return shlex.join(os.path.abspath(folder / word) if word and (folder / word).exists() else word for word in words)
+    changed = [_with_path(word, absolute) for word in words]
+    if words and parameter == "run":
+        program = words[0]
+        is_installed = os.path.basename(program) == program and shutil.which(program) is not None
+        if is_installed or not os.path.isfile(folder / program):
+            changed[0] = program
+        # The word after -m is a module, not the folder of that name.
+        module = words.index("-m") + 1 if "python" in os.path.basename(program) and "-m" in words else len(words)
+        changed[module : module + 1] = words[module : module + 1]
+    return shlex.join(changed)
 
 
 def moved_words(text: str, parameter: str, old: Path, new: Path) -> str:
     """Return a text of words in which paths below the folder `old` are below `new`, where they exist there."""
-    words = []
-    for word in split_words(text, parameter):
-        place = Path(os.path.abspath(word))
-        moved = new / place.relative_to(old) if place.is_relative_to(old) else place
-        words.append(str(moved) if word and moved.exists() else word)
-    return shlex.join(words)
+
+    def moved(path: str) -> str | None:
+        place = Path(os.path.abspath(path))
+        there = new / place.relative_to(old) if place.is_relative_to(old) else place
+        return str(there) if os.path.exists(there) else None
+
+    return shlex.join(_with_path(word, moved) for word in split_words(text, parameter))
 
 
 def with_absolute_paths(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -71,17 +99,26 @@ def with_absolute_paths(values: Mapping[str, Any], folder: Path) -> dict[str, An
 def with_relative_paths(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return parameters of `command` or `precomputed` in which paths below a folder are relative to it."""
 
-    def relative(word: str) -> str:
-        below = os.path.isabs(word) and Path(word).is_relative_to(folder)
-        return os.path.relpath(word, folder) if below else word
+    def relative(path: str) -> str | None:
+        below = os.path.isabs(path) and Path(path).is_relative_to(folder)
+        return os.path.join(os.curdir, os.path.relpath(path, folder)) if below else None
 
     changed = dict(values)
     for name in ("run", "files"):
         if isinstance(values.get(name), str):
-            changed[name] = shlex.join(map(relative, split_words(values[name], name)))
+            changed[name] = shlex.join(_with_path(word, relative) for word in split_words(values[name], name))
     if isinstance(values.get("folder"), str) and values["folder"]:
-        changed["folder"] = relative(values["folder"])
+        changed["folder"] = relative(values["folder"]) or values["folder"]
     return changed
+
+
+def _with_path(word: str, changed: Callable[[str], str | None]) -> str:
+    """Return a word whose path is changed: the word, or what follows ``=`` in it; `changed` gives None for no path."""
+    name, equals, value = word.partition("=")
+    for before, path in (("", word), (name + equals, value)):
+        if path and (new := changed(path)) is not None:
+            return before + new
+    return word
 
 
 def content_digest(paths: Iterable[Path]) -> str:

@@ -70,18 +70,19 @@ class Precomputed(Detector):
             There is none, or there are several.
         """
         stem = file_stem(scene)
-        found = [file for file in vector_files(Path(self.folder)) if file.name.removesuffix(file.suffix) == stem]
+        found = [file for file in vector_files(Path(self.folder)) if file.stem == stem]
         if len(found) == 1:
             return found[0]
         if found:
             names = " and ".join(file.name for file in found)
             raise InputError(f"{self.folder} holds {names} for the scene {scene!r}: keep one of them")
-        raise InputError(f"{self.folder} has no footprints of the scene {scene!r}: add {stem}.gpkg or .geojson")
+        others = [file.name for file in sorted(Path(self.folder).iterdir()) if file.stem == stem]
+        known = f"; {others[0]} is not a vector file that roofbench reads" if others else ""
+        raise InputError(f"{self.folder} has no footprints of the scene {scene!r}: add {stem}.gpkg or .geojson{known}")
 
-    def footprints_of(self, scene: str, seen: Scene) -> Footprints:
-        """Return the footprints of a scene, by its real name and the scene as a detector sees it."""
-        file = self.file_of(scene)
-        return read_output(file, crs=seen.crs, program=file.name)
+    def footprints_of(self, scene: str, crs: str | None) -> Footprints:
+        """Return the footprints of a scene, by its real name and its CRS."""
+        return read_output(self.file_of(scene), crs=crs)
 
     def detect(self, scene: Scene, rng: np.random.Generator) -> Footprints:
         """Raise `UnsupportedError`: only the runner knows the real name of a scene."""
@@ -106,5 +107,5 @@ def vector_files(folder: Path) -> list[Path]:
 def unknown_files(folder: Path, scenes: Iterable[str]) -> list[tuple[Path, str]]:
     """Return the vector files of a folder that belong to none of the scenes, each with a hint at the nearest name."""
     stems = {file_stem(scene) for scene in scenes}
-    unknown = [file for file in vector_files(folder) if file.name.removesuffix(file.suffix) not in stems]
-    return [(file, nearest_hint(file.name.removesuffix(file.suffix), stems)) for file in unknown]
+    unknown = [file for file in vector_files(folder) if file.stem not in stems]
+    return [(file, nearest_hint(file.stem, stems)) for file in unknown]

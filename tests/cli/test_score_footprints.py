@@ -92,7 +92,7 @@ def test_check_says_what_is_missing_and_stores_nothing(place):
     rb.write_footprints(other, place / "mine" / "hamlet-3.gpkg", overwrite=True)
     answer = roofbench("score", "--footprints", "mine", "--suite", "my.toml", "--check", folder=place, expect=2)
     lines = dict(line.split(": ", 1) for line in answer.stdout.splitlines()[:-1])
-    assert "hamlet-1.gpkg wrote what cannot be used" in lines["hamlet-1"]
+    assert lines["hamlet-1"].startswith("hamlet-1.gpkg cannot be read as a vector file")
     assert "has no footprints of the scene 'hamlet-2'" in lines["hamlet-2"]
     assert "outside the extent" in lines["hamlet-3"]
     assert lines["hamlet_2.gpkg"] == "belongs to no scene of 'my' (did you mean 'hamlet-2'?)"
@@ -135,9 +135,11 @@ def test_a_subclass_does_not_learn_the_name_of_the_scene(place):
 
 @pytest.mark.parametrize("axis", ["tree_density = [0, 7.5]", "width = 60"])
 def test_files_are_found_by_the_name_of_a_generated_scene_in_tables(tmp_path, axis):
-    """The scene itself is called otherwise: ``tree_density=0.0``, and without the mark that a name as this one needs."""
+    """The scene itself is called otherwise: ``tree_density=0.0``, and without the mark of ``fairfield@1``."""
     preset = "fairfield" if axis.startswith("width") else "fairfield-1-small"
-    (tmp_path / "my.toml").write_text(f'[[scenes]]\npreset = "{preset}"\nseeds = [1]\nbuildings = 1\nheight = 60\n{axis}\n')
+    (tmp_path / "my.toml").write_text(
+        f'[[scenes]]\npreset = "{preset}"\nseeds = [1]\nbuildings = 1\nheight = 60\n{axis}\n'
+    )
     suite = read_suite(tmp_path / "my.toml")
     (tmp_path / "mine").mkdir()
     for recipe in suite.scenes:
@@ -149,3 +151,28 @@ def test_files_are_found_by_the_name_of_a_generated_scene_in_tables(tmp_path, ax
             assert len(rb.detect(place, f"precomputed[folder={tmp_path / 'mine'}]")) == len(found)
     answer = roofbench("score", "--footprints", "mine", "--suite", "my.toml", "-f", "json", folder=tmp_path)
     assert rows(answer)["precomputed:mine"]["scenes"] == len(suite.scenes)
+
+
+def test_check_and_score_refuse_the_same_files(place):
+    """Of generated and of real scenes: the CRS and the extent of the scene count in both."""
+    own = hamlet(1).reference
+    elsewhere = rb.Footprints.of(own.polygons, crs="EPSG:25833")
+    rb.write_footprints(elsewhere, place / "mine" / "hamlet-1.gpkg", overwrite=True)
+    far = rb.Footprints.of(shapely.transform(own.polygons, lambda xy: xy + 5000.0), crs=own.crs)
+    rb.write_footprints(far, place / "mine" / "hamlet-2.gpkg", overwrite=True)
+    (place / "mine" / "hamlet-3.gpkg").rename(place / "mine" / "hamlet-3.kml")
+    answer = roofbench("score", "--footprints", "mine", "--suite", "my.toml", "--check", folder=place, expect=2)
+    lines = dict(line.split(": ", 1) for line in answer.stdout.splitlines()[:-1])
+    assert "hamlet-1.gpkg holds polygons in EPSG:25833, but the scene is in EPSG:25832" in lines["hamlet-1"]
+    assert "outside the extent" in lines["hamlet-2"]
+    assert "hamlet-3.kml is not a vector file that roofbench reads" in lines["hamlet-3"]
+    roofbench("score", "--footprints", "mine", "--suite", "my.toml", folder=place, expect=3)
+
+
+def test_footprints_of_a_scene_in_tiles_are_read_whole(place):
+    (place / "my.toml").write_text('[[scenes]]\npath = "village"\ntile = 64\n')
+    answer = roofbench("score", "--footprints", "mine", "--suite", "my.toml", "-f", "json", folder=place)
+    assert rows(answer)["precomputed:mine"]["object.quality"] == 1.0
+    tiled = ("detect", "precomputed[folder=mine]", "village", "--tile", "64", "-o", "out.gpkg", "-j", "0")
+    refused = roofbench(*tiled, folder=place, expect=3)
+    assert "detect without tiles" in " ".join(refused.stderr.split())

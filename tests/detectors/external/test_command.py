@@ -90,6 +90,8 @@ CASES = {
         r"no polygons among 1 feature",
     ),
     "gigabyte": ("head -c 1000000000 /dev/zero > $3", r"footprints.geojson is larger than 5 MB"),
+    "folder": ("mkdir $3", r"wrote no footprints but a folder"),
+    "removes": ("rm -r $(dirname $1)", r"wrote no footprints: it must write"),
     "talks": ("yes | head -c 100000000", r"log.txt is larger than 5 MB"),
 }
 
@@ -114,7 +116,7 @@ def test_another_crs_is_refused(program, tmp_path):
     scene = rb.Scene("utm", (500_000, 5_700_000, 500_100, 5_700_100), crs="EPSG:25832", points=hamlet(1).points)
     file = tmp_path / "other.geojson"
     file.write_text(collection(scene, crs="urn:ogc:def:crs:EPSG::25833"))
-    with pytest.raises(ProgramError, match=r"footprints in EPSG:25833.*but the scene is in EPSG:25832"):
+    with pytest.raises(ProgramError, match=r"polygons in EPSG:25833.*but the scene is in EPSG:25832"):
         rb.detect(scene, program(f"cp {file} $3"))
     file.write_text(collection(scene, crs="urn:ogc:def:crs:EPSG::25832"))
     assert len(rb.detect(scene, program(f"cp {file} $3"))) == 1
@@ -135,9 +137,11 @@ def test_one_geometry_with_heights_among_others_is_refused(program, scene, tmp_p
     raised = json.loads(collection(scene, z=",12.5"))["features"][0]
     raised["geometry"] = {"type": "MultiPolygon", "coordinates": [raised["geometry"]["coordinates"]]}
     file = tmp_path / "mixed.geojson"
-    file.write_text(json.dumps({**flat, "features": [*flat["features"], raised]}))
-    with pytest.raises(ProgramError, match="three dimensions"):
-        rb.detect(scene, program(f"cp {file} $3"))
+    measured = json.loads(collection(scene, z=",12.5,0.1"))  # a fourth number, with which OGR says "Polygon"
+    for content in ({**flat, "features": [*flat["features"], raised]}, measured):
+        file.write_text(json.dumps(content))
+        with pytest.raises(ProgramError, match="three dimensions"):
+            rb.detect(scene, program(f"cp {file} $3"))
 
 
 def test_invalid_polygons_are_repaired(program, scene, tmp_path):
@@ -204,6 +208,9 @@ def test_settings_and_seed_reach_the_parameter_file(program, scene, square, tmp_
     assert seen[0]["seed"] == seen[2]["seed"] != seen[1]["seed"]
     rb.detect(scene, program(body, settings="height=3"))
     assert (tmp_path / "parameters.json").read_text() == '{\n "height": 3\n}\n'
+    rb.detect(scene, program(body, settings="classes=[2,6] name=Süd none=NaN"))
+    lines = (tmp_path / "parameters.json").read_text(encoding="utf-8").splitlines()
+    assert lines == ["{", ' "classes": [2, 6],', ' "name": "Süd",', ' "none": "NaN"', "}"]
 
 
 def test_the_fingerprint_follows_the_content_of_program_and_files(program, tmp_path):
@@ -230,6 +237,39 @@ def test_a_script_after_its_interpreter_counts(tmp_path):
     assert detector.fingerprint() != before
 
 
+def test_a_file_after_an_equals_sign_is_found_and_counts(program, scene, square, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("trees.pt").write_text("1")
+    program(f"test -f ${{1#--model=}} && cp {square} $4")
+    detector = make_detector("command", {"run": "./detect.sh --model=trees.pt"})
+    assert detector.run == f"{tmp_path}/detect.sh --model={tmp_path}/trees.pt"
+    assert len(rb.detect(scene, detector)) == 1
+    before = detector.fingerprint()
+    Path("trees.pt").write_text("22")
+    assert detector.fingerprint() != before
+    assert Path("trees.pt").absolute() in detector.code_files()
+
+
+@pytest.mark.parametrize(
+    ("run", "expected"),
+    [
+        ("sh detect.sh", "sh {here}/detect.sh"),  # the folder sh is no program
+        ("cat detect.sh", "cat {here}/detect.sh"),  # a file without a slash is not what a shell would start
+        ("./cat", "{here}/cat"),
+        ("detect.sh", "{here}/detect.sh"),
+        ("python -m trees model", "python -m trees {here}/model"),
+        (f"sh -c '{300 * 'x'}'", f"sh -c {300 * 'x'}"),
+    ],
+)
+def test_the_words_of_a_command_are_those_that_a_shell_would_take(program, tmp_path, monkeypatch, run, expected):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("sh", "trees", "model"):
+        Path(folder).mkdir()
+    Path("cat").touch()
+    program("true")
+    assert make_detector("command", {"run": run}).run == expected.format(here=tmp_path)
+
+
 def test_a_missing_tool_is_a_skip(program, scene):
     with pytest.raises(MissingInputError, match=r"detect.sh cannot run here: install it first"):
         rb.detect(scene, program("echo install it first; exit 77"))
@@ -239,6 +279,7 @@ def test_a_missing_tool_is_a_skip(program, scene):
     ("parameters", "reason"),
     [
         ({}, "give either run"),
+        ({"run": " "}, "give either run"),
         ({"run": "sh", "recipe": "whitebox"}, "give either run"),
         (
             {"run": "no-such-program-anywhere x"},
@@ -312,8 +353,9 @@ def test_the_rest_of_a_suite_completes(program, scene, square, tmp_path, misbeha
         assert trace.rstrip().endswith("one\nno roofs")
 
 
-def test_a_worker_that_is_stopped_ends_its_program(program, tmp_path):
-    """The time limit of the run, not of the program: the worker is killed, and the program with it."""
+@pytest.mark.skipif(sys.platform != "linux", reason="the command setsid is of Linux")
+def test_a_worker_that_is_stopped_leaves_nothing_behind(program, tmp_path, monkeypatch):
+    """The time limit of the run, not of the program: neither its processes nor its files are left."""
     import psutil
 
     from roofbench.benchmark.execution.isolation import IsolatedProcess
@@ -322,15 +364,23 @@ def test_a_worker_that_is_stopped_ends_its_program(program, tmp_path):
     from roofbench.benchmark.store.outcomes import Outcome
     from roofbench.core.processes import Limits
 
-    detector = program(f"echo $$ > {tmp_path}/pid; sleep 300")
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setenv("TMPDIR", str(place))
+    monkeypatch.setattr("tempfile.tempdir", str(place))
+    detector = program(
+        f"echo $$ > {tmp_path}/pid; (setsid sleep 300 & echo $! > {tmp_path}/child); touch many; sleep 300"
+    )
     task = Task(
         scene=SceneRecipe.of_preset("hamlet", seed=1), detector=PluginRecipe.of(detector), seed=0, evaluators=()
     )
     process = IsolatedProcess()
-    outcome = Outcome.from_bytes(process.call(task.to_json(), Limits(seconds=20)))
-    assert outcome.reason == "time limit of 20 s exceeded"
-    pid = int((tmp_path / "pid").read_text())
-    assert not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+    outcome = Outcome.from_bytes(process.call(task.to_json(), Limits(seconds=15)))
+    assert outcome.reason == "time limit of 15 s exceeded"
+    for name in ("pid", "child"):
+        number = int((tmp_path / name).read_text())
+        assert not psutil.pid_exists(number) or psutil.Process(number).status() == psutil.STATUS_ZOMBIE
+    assert list(place.iterdir()) == []
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux counts the highest memory")
