@@ -72,7 +72,8 @@ def _resample(
         steps = n if closed else n - 1
         for k in range(steps):
             here, there = points[first + k], points[first + k + 1 if k + 1 < n else first]
-            distance[first + i + k + 1] = distance[first + i + k] + math.hypot(there[0] - here[0], there[1] - here[1])
+            dx, dy = there[0] - here[0], there[1] - here[1]
+            distance[first + i + k + 1] = distance[first + i + k] + math.sqrt(dx * dx + dy * dy)
         total = distance[first + i + steps]
         counts[i + 1] = max(2, round(total / spacing)) + (0 if closed else 1)
     out_offsets = counts.copy()
@@ -128,6 +129,10 @@ def trace_shapes(black: NDArray[np.uint8], *, shortest: float, gsd: float, sampl
     Points are the centres of the black pixels along the border, half a pixel inside the true edge. Along a curve, black
     lies across (see `boxes`), for outer and inner outlines alike.
     """
+    if shortest > gsd:
+        # Most shapes are single pixels, of no length, and each would be an outline: they become white.
+        around = cv2.boxFilter(black, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+        black = np.minimum(black, around - 1)
     found, hierarchy = cv2.findContours(black, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     parents = np.empty(0, dtype=np.int32) if hierarchy is None else hierarchy[0, :, 3]
     # A step is a pixel or a diagonal long.

@@ -40,24 +40,27 @@ def accumulated_distance(curve: NDArray[np.float64], chord: int, closed: bool) -
     out = np.zeros(n)
     x, y = curve[:, 0].copy(), curve[:, 1].copy()
     starts = n if closed else max(n - chord, 0)
-    dx, dy, norm = np.zeros(starts), np.zeros(starts), np.ones(starts)
+    dx, dy = np.empty(starts), np.empty(starts)
+    for start in range(min(starts, n - chord)):
+        i, end = np.uintp(start), np.uintp(start) + np.uintp(chord)  # unsigned: no index from the end
+        dx[i], dy[i] = x[end] - x[i], y[end] - y[i]
+    for start in range(max(n - chord, 0), starts):
+        dx[start], dy[start] = x[start + chord - n] - x[start], y[start + chord - n] - y[start]
     for start in range(starts):
-        end = start + chord if start + chord < n else start + chord - n
-        across, down = x[end] - x[start], y[end] - y[start]
-        length = math.hypot(across, down)
-        if length >= 1e-9:
-            dx[start], dy[start], norm[start] = across, down, length
+        # np.divide has no test for zero, which would prevent vectorisation: a chord of no length has no direction.
+        scale = np.divide(1.0, max(math.sqrt(dx[start] * dx[start] + dy[start] * dy[start]), 1e-9))
+        dx[start] *= scale
+        dy[start] *= scale
     # The inner loop runs over neighbours in memory, and each point adds up its chords in the order of their starts:
-    # those over the end of a closed curve last. np.divide has no test for zero, which would prevent vectorisation.
+    # those over the end of a closed curve last.
     for step in range(chord - 1, 0, -1):
         for start in range(min(starts, n - step)):
-            i, to = np.uintp(start), np.uintp(start) + np.uintp(step)  # unsigned: no index from the end
-            out[to] += np.divide((x[to] - x[i]) * dy[i] - (y[to] - y[i]) * dx[i], norm[i])
+            i, to = np.uintp(start), np.uintp(start) + np.uintp(step)
+            out[to] += (x[to] - x[i]) * dy[i] - (y[to] - y[i]) * dx[i]
     for step in range(chord - 1, 0, -1):
         for k in range(starts + step - n):
             start = n - step + k
-            aside = (x[k] - x[start]) * dy[start] - (y[k] - y[start]) * dx[start]
-            out[k] += np.divide(aside, norm[start])
+            out[k] += (x[k] - x[start]) * dy[start] - (y[k] - y[start]) * dx[start]
     for k in range(n):
         out[k] = abs(out[k])
     return out

@@ -213,6 +213,9 @@ class Improved(LineDetector):
         prefix: NDArray[np.int32] = prefix_sums(entropy)
         return prefix, limit, scale
 
+    def _heights_matter(self) -> bool:
+        return self.texture == "score"
+
     def _smoothness(
         self, points: PointCloud, heights: NDArray[np.float64], grid: Grid, spacing: float
     ) -> Smoothness | None:

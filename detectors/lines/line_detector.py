@@ -51,6 +51,8 @@ _EXTENSION_PART = 3.5
 #: Root mean square distance from its line above which a segment contains a missed corner: in point spacings, and in
 #: pixels, because the staircase of a mask is no corner.
 _MISSED_CORNER, _STAIRCASE = 0.4, 0.5
+#: Share of a length that is left for rounding.
+_ROUNDING = 1e-6
 #: Note on grey images.
 _GREY = "the image is grey: no line is tested for vegetation, and roofs are followed by brightness alone"
 #: Raster that stands for unused entropy.
@@ -187,7 +189,8 @@ class LineDetector(LineParameters):
         surface = None if self.ground == "tile-mode" or not len(points) else scene.heights.ground
         ground = ground_heights(points, surface, method=self.ground, tile_side=tile_side)
         if self.ground == "point-dem" and self.below_ground < 1 and len(points):
-            ground += ground_correction(points, ground, self.below_ground)
+            deciding = None if self._heights_matter() else self.height
+            ground += ground_correction(points, ground, self.below_ground, deciding=deciding)
         masks = self._masks(points, ground + self.height, grid, spacing)
         vegetation = vegetation_prefix(image, self.vegetation)
         entropy, limit, scale = self._entropy(image, masks, vegetation)
@@ -218,6 +221,10 @@ class LineDetector(LineParameters):
         """Return the row prefix sums of the entropy, the mean above which green areas are trees, and its scale."""
         return _NO_ENTROPY, 0.0, None
 
+    def _heights_matter(self) -> bool:
+        """Return whether more is asked of heights above ground than whether they exceed the threshold."""
+        return False
+
     def _smoothness(
         self, points: PointCloud, heights: NDArray[np.float64], grid: Grid, spacing: float
     ) -> Smoothness | None:
@@ -244,7 +251,10 @@ class LineDetector(LineParameters):
         """Return the lines around the black shapes, and their outcomes so far."""
         gsd = rasters.gsd
         black = rasters.masks.primary
-        curves = trace_shapes(black, shortest=self.minimum_side, gsd=gsd, sample=self._sample(rasters))
+        least = self.minimum_side - 2 * _OUTSET * gsd
+        # An outline is at least twice as long as a line along it, there and back.
+        shortest = max(self.minimum_side, 2 * least * (1 - _ROUNDING))
+        curves = trace_shapes(black, shortest=shortest, gsd=gsd, sample=self._sample(rasters))
         points, corners, offsets = find_corners(
             curves,
             sigma=self.smoothing,

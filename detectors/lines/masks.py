@@ -54,7 +54,7 @@ _BARE = 4.0
 _HEIGHT_BIN = 2.0
 #: Side of the cells of masks that do not follow the image, metres.
 _MASK_CELL = 0.25
-#: Share of a cell by which rounding may move a place.
+#: Share of a cell, or metres, by which rounding may move a place or a height.
 _ROUNDING = 1e-6
 
 
@@ -169,56 +169,131 @@ def ground_heights(
     return _tile_dem(points, ground, tile_side) if method == "tile-dem" else ground.sample(points.x, points.y)
 
 
-def ground_correction(points: PointCloud, ground: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+def ground_correction(
+    points: PointCloud, ground: NDArray[np.float64], share: float, *, deciding: float | None = None
+) -> NDArray[np.float64]:
     """Return the correction of raised ground at each point, metres, shape (n,): zero or less.
 
     In cells of 4 m, at most `share` of the points may lie below the ground. The correction of a cell is the largest
     that it or one of its eight neighbours needs, because a house hides the ground below it. Between the centres of
     cells the correction is interpolated.
+
+    Parameters
+    ----------
+    points : PointCloud
+    ground : ndarray, shape (n,)
+        Height of the ground under each point, metres; NaN where it is not known.
+    share : float
+    deciding : float, optional
+        Height above the ground, metres: only corrections that can decide whether a point is above it are computed, and
+        the others are 0. None: all are computed.
     """
     above = points.z - ground
     known = np.isfinite(above)
-    x, y = points.x, points.y
+    x, y, own = points.x, points.y, above
     if not known.all():
-        x, y, above = x[known], y[known], above[known]
-    below = np.flatnonzero(above < 0)
-    if not len(below):
-        return np.zeros(len(points))
+        x, y, own = x[known], y[known], above[known]
+    correction = np.zeros(len(points))
+    if not len(own) or own.min() >= 0:
+        return correction
     grid = Grid.covering((x.min() - _CORRECTION_CELL, y.min() - _CORRECTION_CELL, x.max(), y.max()), _CORRECTION_CELL)
     cell = grid.cells(x, y)[0]
-    allowed = np.floor(share * np.bincount(cell, minlength=grid.rows * grid.columns)).astype(np.int64)
-    low = _lowest(above[below].astype(np.float32), cell[below], allowed)
-    lowest = cv2.erode(low.reshape(grid.shape), np.ones((3, 3), np.uint8))
-    return Elevation(lowest, grid).sample(points.x, points.y)
+    wanted = np.ones(grid.shape, dtype=np.uint8)
+    if deciding is not None:
+        # No correction is larger than the depth of the lowest point.
+        least = deciding + own.min() - _ROUNDING
+        undecided = (own >= least) & (own <= deciding + _ROUNDING)
+        wanted[:] = 0
+        wanted.ravel()[cell[undecided]] = 1
+        # A correction is interpolated from the next cells, which follow their neighbours.
+        wanted = cv2.dilate(wanted, np.ones((5, 5), np.uint8))
+    low = _lowest(own, cell, share, wanted.ravel()).reshape(grid.shape)
+    lowest = Elevation(cv2.erode(low, np.ones((3, 3), np.uint8)), grid)
+    if deciding is None:
+        return lowest.sample(points.x, points.y)
+    place = np.flatnonzero(known)[undecided]
+    correction[place] = lowest.sample(points.x[place], points.y[place])
+    return correction
 
 
 @kernel
-def _lowest(above: NDArray[np.float32], cell: NDArray[np.intp], allowed: NDArray[np.int64]) -> NDArray[np.float32]:
-    """Return the lowest height of each cell after its `allowed` lowest ones, at most 0."""
-    ends = np.cumsum(allowed + 1)
-    lowest = np.zeros(ends[-1], dtype=np.float32)  # of each cell the allowed ones and the next, in rising order
+def _lowest(
+    above: NDArray[np.float64], cell: NDArray[np.intp], share: float, wanted: NDArray[np.uint8]
+) -> NDArray[np.float32]:
+    """Return the lowest height of each cell after the `share` of its points that may be lower, at most 0.
+
+    Cells that are not wanted, of which `wanted` has one number each, have 0.
+    """
+    cells = len(wanted)
+    starts, ends = np.zeros(cells + 1, dtype=np.int64), np.zeros(cells, dtype=np.int64)
     for i in range(len(above)):
-        height, last = above[i], ends[cell[i]] - 1
-        first = last - allowed[cell[i]]
-        if height < lowest[last]:
-            place = last
-            while place > first and lowest[place - 1] > height:
-                lowest[place] = lowest[place - 1]
-                place -= 1
-            lowest[place] = height
-    return lowest[ends - 1]
+        starts[cell[i] + 1] += wanted[cell[i]]
+    for k in range(cells):
+        starts[k + 1] += starts[k]
+        ends[k] = starts[k]
+    # By cell, the heights below 0, which end at `ends`. A height above 0 is overwritten: no branch is mispredicted.
+    heights = np.empty(starts[cells], dtype=np.float32)
+    for i in range(len(above)):
+        if wanted[cell[i]]:
+            heights[ends[cell[i]]] = above[i]
+            ends[cell[i]] += above[i] < 0
+    lowest = np.zeros(cells, dtype=np.float32)
+    for k in range(cells):
+        allowed = math.floor(share * (starts[k + 1] - starts[k]))
+        if ends[k] - starts[k] > allowed:
+            lowest[k] = _ranked(heights[starts[k] : ends[k]], allowed)
+    return lowest
+
+
+@kernel
+def _ranked(values: NDArray[np.float32], rank: int) -> np.float32:
+    """Return the value with `rank` values before it in rising order; the values are reordered in place (Hoare)."""
+    first, last = 0, len(values) - 1
+    while first < last:
+        pivot = values[(first + last) // 2]
+        i, j = first, last
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i, j = i + 1, j - 1
+        if rank <= j:
+            last = j
+        elif rank >= i:
+            first = i
+        else:
+            break
+    return np.float32(values[rank])
 
 
 def _hits(
     points: PointCloud, thresholds: NDArray[np.float64], grid: Grid
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return the pixels with a point below its threshold, and those with one above."""
-    index, inside = grid.cells(points.x, points.y)
     hits = np.zeros((2, grid.rows * grid.columns), dtype=np.uint8)
-    hits[0, index[inside & (points.z < thresholds)]] = 1
-    hits[1, index[inside & (points.z > thresholds)]] = 1
+    _mark(*grid.cells(points.x, points.y), points.z, thresholds, hits)
     low, high = hits.reshape(2, *grid.shape)
     return low, high
+
+
+@kernel
+def _mark(
+    cell: NDArray[np.intp],
+    inside: NDArray[np.bool_],
+    z: NDArray[np.float64],
+    thresholds: NDArray[np.float64],
+    hits: NDArray[np.uint8],
+) -> None:
+    """Fill the cells of points below their threshold in the first row of `hits`, of those above in the second."""
+    for i in range(len(z)):
+        if inside[i]:
+            if z[i] < thresholds[i]:
+                hits[0, cell[i]] = 1
+            elif z[i] > thresholds[i]:
+                hits[1, cell[i]] = 1
 
 
 def _squares(hits: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:

@@ -64,6 +64,8 @@ def refined(image: Image, largest: float) -> Image:
         return image
     fine = Grid(grid.west, grid.north, grid.gsd / parts, grid.rows * parts, grid.columns * parts)
     size = (fine.columns, fine.rows)
-    values = np.stack([cv2.resize(band, size, interpolation=cv2.INTER_LINEAR) for band in image.values])
+    values = np.empty((len(image.values), *fine.shape), dtype=image.values.dtype)
+    for band, finer in zip(image.values, values, strict=True):
+        cv2.resize(band, size, dst=finer, interpolation=cv2.INTER_LINEAR)
     valid = None if image.valid is None else image.valid.repeat(parts, axis=0).repeat(parts, axis=1)
     return Image(values, image.bands, fine, valid)

@@ -136,3 +136,42 @@ def test_a_piece_that_missed_a_corner_is_split_where_it_is_farthest_from_its_cho
     assert len(split) == 2
     np.testing.assert_allclose(lengths(split.lines), [60, 30])
     np.testing.assert_allclose(np.abs(split.lines[:, [UX, UY]]), [[1, 0], [0, 1]], atol=1e-9)
+
+
+def blobs(seed):
+    """Return a mask of shapes of all sizes, most of them single pixels, up to the border."""
+    rng = np.random.default_rng(seed)
+    black = (rng.random((120, 150)) < 0.03).astype(np.uint8)
+    for _ in range(25):
+        row, column, height, width = rng.integers([0, 0, 1, 1], [115, 145, 30, 30])
+        black[row : row + height, column : column + width] = 1
+    black[rng.random(black.shape) < 0.03] = 0
+    return black
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_single_pixels_have_no_outline_and_change_no_other(seed):
+    black = blobs(seed)
+    every, longer = (trace_shapes(black, shortest=shortest, gsd=GSD) for shortest in (GSD, 1.01 * GSD))
+    sizes = np.diff(every.offsets)
+    single = [len(np.unique(every.points[a:b], axis=0)) == 1 for a, b in itertools.pairwise(every.offsets)]
+    assert sum(single) > 100
+    kept = np.repeat(~np.array(single), sizes)
+    np.testing.assert_array_equal(longer.points, every.points[kept])
+    # Shapes are numbered anew; the outlines of one stay together.
+    numbers = every.shapes[~np.array(single)]
+    assert len(set(zip(numbers, longer.shapes, strict=True))) == len(set(numbers)) == len(set(longer.shapes))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_outline_is_twice_as_long_as_any_line_along_it(seed):
+    black = blobs(seed)
+    found = []
+    for shortest in (1.0, 2.0):
+        curves = trace_shapes(black, shortest=shortest, gsd=GSD)
+        points, corners, offsets = find_corners(curves, sigma=3.0, product=0.2, straight=(157.0, 203.0))
+        found.append(fit_segments(curves, points, corners, offsets, shortest=1.0 / GSD).lines)
+        found.append(len(curves))
+    assert len(found[0]) > 20
+    np.testing.assert_array_equal(found[0], found[2])
+    assert found[3] < found[1]

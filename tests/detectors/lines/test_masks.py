@@ -1,5 +1,7 @@
 """Masks and ground heights: what each point marks, and which height is its ground."""
 
+import math
+
 import numpy as np
 import pytest
 from naive import lines as naive_lines
@@ -190,12 +192,28 @@ def test_no_more_than_the_share_of_the_points_of_a_cell_lie_below_the_corrected_
         assert value == pytest.approx(step[int(y // 4), int(x // 4)], abs=1e-5)
 
 
-def test_the_lowest_heights_of_cells_are_those_of_sorted_ones():
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.35, 1.0])
+def test_the_lowest_heights_of_cells_are_those_of_sorted_ones(share):
     rng = np.random.default_rng(3)
-    heights = np.concatenate([rng.normal(0, 3, 400), [0.0, -0.0, 1e-8, -1e-8]]).astype(np.float32)
-    cell = rng.integers(0, 12, len(heights))
-    allowed = rng.integers(0, 10, 14)  # two cells are empty
-    expected = [
-        min([*np.sort(heights[cell == number]), *[0.0] * 10][count], 0.0) for number, count in enumerate(allowed)
-    ]
-    np.testing.assert_array_equal(_lowest(heights, cell, allowed), np.array(expected, dtype=np.float32))
+    heights = np.concatenate([rng.normal(0, 3, 400), rng.integers(-3, 3, 60), [0.0, -0.0, 1e-8, -1e-8]])
+    cell = rng.integers(0, 12, len(heights))  # two cells are empty
+    expected = []
+    for number in range(14):
+        own = np.sort(heights[cell == number].astype(np.float32))
+        expected.append(min([*own, 0.0][math.floor(share * len(own))], 0.0))
+    wanted = np.ones(14, dtype=np.uint8)
+    wanted[[3, 12]] = expected[3] = 0
+    np.testing.assert_array_equal(_lowest(heights, cell, share, wanted), np.array(expected, dtype=np.float32))
+
+
+@pytest.mark.parametrize("height", [0.0, 2.5, 3.0])
+def test_corrections_that_decide_give_the_same_points_above_as_all_corrections(height):
+    points, slope, _ = house_on_a_pad()
+    slope[::97] = np.nan
+    every, deciding = ground_correction(points, slope, 0.1), ground_correction(points, slope, 0.1, deciding=height)
+    for is_beyond in (np.less, np.greater):
+        expected = is_beyond(points.z, slope + every + height)
+        np.testing.assert_array_equal(is_beyond(points.z, slope + deciding + height), expected)
+    computed = deciding != 0
+    assert 0 < computed.sum() < 0.6 * len(points)
+    np.testing.assert_array_equal(deciding[computed], every[computed])
