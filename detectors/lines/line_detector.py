@@ -289,6 +289,8 @@ class LineDetector(LineParameters):
     ) -> tuple[Boxes, NDArray[np.int64]]:
         """Return the initial rectangles, and the index of the one of each line, `INSIDE` or `TOO_NARROW`."""
         gsd, growth = rasters.gsd, self._growth(rasters)
+        if self.rectangle_extension is not None:
+            growth = growth._replace(step=self.rectangle_extension / gsd)
         rules = InitialRules(
             depth=self.initial_width / gsd,
             least_side=(self.minimum_side if self.least_rectangle is None else self.least_rectangle) / gsd,

@@ -1,8 +1,10 @@
 """The modes of the line detectors: defaults as printed, and as in the authors' own program.
 
 Both name the parameters that differ from the default readings. Parameters of one detector alone are beside its class.
-Of the program, three rules are not followed: its least squares of y on x are undefined for steep lines; the first and
-last bin of the orientation histograms are always one; and the masks on cells of 0.25 m are resampled to the image.
+Of the program, these rules are not followed: its least squares of y on x are undefined for steep lines; the first and
+last bin of the orientation histograms are always one; the masks on cells of 0.25 m are resampled to the image; where
+the DEM has no value, the ground is that of all detectors (`Scene.heights`); test 5 takes the highest bin of any edge,
+not of the longest one; and the inside point of a line need not be in the rectangle that contains the line.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ PROGRAM: Mapping[str, Any] = {
     "band_width": 2.0,
     "vegetation": "sigma",
     "nir_threshold": 25.5,
+    "rectangle_extension": 1.5,
     "least_rectangle": 2.0,
     "reduction": 0.3,
     "filled_share": 0.7,

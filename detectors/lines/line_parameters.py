@@ -175,7 +175,8 @@ class LineParameters(Detector):
         source="2010, 3.3.2",
     )  # fmt: skip
     extension: float = parameter(
-        3.0, unit="m", minimum=0.1, doc="depth and first step of the extension of lines and initial rectangles",
+        3.0, unit="m", minimum=0.1,
+        doc="depth and first step of the extension of lines, and first step of that of initial rectangles",
         source="2010, 3.3.2",
     )  # fmt: skip
     extension_stop: float | None = parameter(
@@ -186,6 +187,11 @@ class LineParameters(Detector):
     extension_black: float = parameter(
         0.7, minimum=0, maximum=1, swept=(0.6, 0.7, 0.8, 0.9), doc="least share of black in a step of that extension",
         source="2010, 3.3.2",
+    )  # fmt: skip
+    rectangle_extension: float | None = parameter(
+        None, unit="m", minimum=0.1,
+        doc="first step of the extension of initial rectangles; none: that of lines, as printed",
+        source="2010, 3.3.3; program",
     )  # fmt: skip
     extension_part: float | None = parameter(
         None, unit="m", minimum=0.1,

@@ -134,6 +134,18 @@ def test_strips_must_be_of_the_kind_of_their_line(green_line, green_ground, reac
     assert (found[U1] > 30) == bool(reaches)
 
 
+def test_the_first_step_of_a_rectangle_is_its_own():
+    """Below the last step, 2 m, no rectangle is extended from its 1.5 m; lines are extended as before."""
+    scene = SceneBuilder().house(rectangle(30, 30, 20, 14, 20)).build().for_detection()
+    same, own = (
+        Original(extension_stop=2.0, rectangle_extension=step, largest_pixel=1000.0).trace(scene)
+        for step in (None, 1.5)
+    )
+    np.testing.assert_array_equal(own.lines, same.lines)
+    assert len(same.initial) > len(own.initial) == 0
+    assert (own.outcomes[same.outcomes == Outcome.RECTANGLE] == Outcome.NARROW).all()
+
+
 def test_any_high_bin_is_a_peak():
     histogram = np.zeros((1, BIN_COUNT))
     histogram[0, [5, 6]] = 10.0, 9.5
