@@ -75,6 +75,8 @@ def parse_selection(text: str) -> tuple[str, dict[str, str]]:
                 key, value = parse_assignment(item)
             except ParameterError:
                 raise ParameterError(f"cannot read {item.strip()!r} in {text!r}: write parameter=value") from None
+            if key in values:
+                raise ParameterError(f"{text!r} gives {key} twice: give it once")
             values[key] = value[1:-1] if len(value) > 1 and value[0] == value[-1] == '"' else value
     return match["name"].strip(), values
 

@@ -6,6 +6,7 @@ import shapely
 from builders.line_scenes import GREEN_ROOF, SceneBuilder, rectangle
 
 from roofbench.benchmark.identity.recipes import PluginRecipe, label_of
+from roofbench.core.errors import ParameterError
 from roofbench.detectors.lines.trace import Outcome
 from roofbench.detectors.registry import make_detector
 
@@ -70,3 +71,8 @@ def test_the_border_of_the_points_makes_lines_only_where_it_is_kept():
     assert (dropped.outcomes == Outcome.BORDER).any()
     assert not (kept.outcomes == Outcome.BORDER).any()
     assert kept.masks.primary.sum() > dropped.masks.primary.sum()
+
+
+def test_a_mode_that_is_given_twice_is_refused():
+    with pytest.raises(ParameterError, match=r"gives mode twice"):
+        make_detector("original[mode=paper,mode=program]")
