@@ -34,6 +34,8 @@ _Floats = NDArray[np.float32]
 _NONE: Mapping[str, str] = {}
 #: Names of the cue that is never silent, of the other one from coordinates, and of that from an image.
 ANCHOR, PENETRATION, IMAGE = "roughness", "penetration", "image vegetation"
+#: Why a cue is silent that has no value where it would count.
+_UNKNOWN = "it is not known of any high cell"
 #: Cues from coordinates, which are silent only where they are constant, and the share of cells within `_CONSTANT` of
 #: the median rating from which they are.
 _GEOMETRIC = frozenset({ANCHOR, PENETRATION})
@@ -97,7 +99,7 @@ def informative_cues(
     untested = _GEOMETRIC | set(independent)
     values = {name: rating[among] for name, rating in ratings.items()}
     silent = dict(known_silent)
-    silent |= {name: "the points do not record it" for name, rating in values.items() if not np.isfinite(rating).any()}
+    silent |= {name: _UNKNOWN for name, rating in values.items() if not np.isfinite(rating).any()}
     for name in sorted(untested - {ANCHOR} - silent.keys()):
         if name in values and _is_constant(values[name]):
             silent[name] = "it has the same value everywhere"
@@ -125,7 +127,7 @@ def silence_of(trees: int, of_trees: float, roofs: int, of_roofs: float) -> str 
         Sum of the ratings of each.
     """
     if not trees + roofs:
-        return "it is not known of any high cell"
+        return _UNKNOWN
     found = _separation_of(trees, of_trees / max(trees, 1), roofs, of_roofs / max(roofs, 1))
     return None if found >= _LEAST_SEPARATION else _reason(found)
 

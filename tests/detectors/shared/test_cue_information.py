@@ -50,7 +50,7 @@ def test_a_cue_without_values_is_silent_and_nothing_high_silences_nothing_else()
     ratings = {ANCHOR: rating(-0.6, 0.7), "image vegetation": np.full(SHAPE, np.nan, dtype=np.float32)}
     found = informative_cues(ratings, HIGH)
     assert found.used == (ANCHOR,)
-    assert "do not record" in found.silent["image vegetation"]
+    assert "not known of any high cell" in found.silent["image vegetation"]
     assert informative_cues({}, HIGH).used == ()
     assert informative_cues(ratings, ~HIGH).used == ()
 
