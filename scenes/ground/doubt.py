@@ -6,8 +6,9 @@ far
     Cells with points whose nearest cell with a ground point lies more than `_FAR` metres away: the middle of a hall,
     dense forest. The ground there is interpolated.
 raised
-    Parts of the ground that a closed ring of steps of `_STEP` metres down to the rest surrounds. A terrace held by
-    walls all around looks like that, and so does a roof that the filter left.
+    Parts of the ground that a closed ring of steps of `_STEP` metres down to the rest surrounds, or nearly half of one
+    where the border of the scene cuts them. A terrace held by walls all around looks like that, and so does a roof that
+    the filter left.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ __all__ = ["doubt_note", "doubtful_ground"]
 _FAR, _STEP = 40.0, 2.0
 #: Square metres: smaller raised parts are noise.
 _SMALLEST = 100.0
+#: Share of the outline of a part that must be steps where the border of the scene is the rest of it: a roof cut at a
+#: corner has half, the upper side of a cliff through the scene a third.
+_RINGED = 0.45
 #: Share of the scene from which on a note is written.
 _SHARE = 0.001
 
@@ -49,7 +53,7 @@ def doubtful_ground(ground: Elevation, seen: NDArray[np.bool_], covered: NDArray
 
 
 def _raised(ground: Elevation) -> NDArray[np.bool_]:
-    """Return the parts of the ground within closed rings of steps down."""
+    """Return the parts of the ground within rings of steps down."""
     import cv2
 
     ring = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
@@ -60,12 +64,12 @@ def _raised(ground: Elevation) -> NDArray[np.bool_]:
     if not top.any():
         return np.zeros(values.shape, dtype=bool)
     _, labels, statistics, _ = cv2.connectedComponentsWithStats((~top).astype(np.uint8), connectivity=4)
-    rows, columns = values.shape
-    left, upper = statistics[:, cv2.CC_STAT_LEFT], statistics[:, cv2.CC_STAT_TOP]
-    inner = (left > 0) & (upper > 0)
-    inner &= left + statistics[:, cv2.CC_STAT_WIDTH] < columns
-    inner &= upper + statistics[:, cv2.CC_STAT_HEIGHT] < rows
-    inner &= statistics[:, cv2.CC_STAT_AREA] * ground.grid.gsd**2 >= _SMALLEST
+    inner = statistics[:, cv2.CC_STAT_AREA] * ground.grid.gsd**2 >= _SMALLEST
+    beside = cv2.dilate(top.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))) > 0
+    on_border = np.ones(values.shape, dtype=bool)
+    on_border[1:-1, 1:-1] = False
+    stepped, cut = (np.bincount(labels[part], minlength=len(inner)) for part in (beside, on_border & ~beside))
+    inner &= stepped >= _RINGED * (stepped + cut)
     inner[0] = False
     # Steps at the top of a pit surround it, too; the ring of a raised part is as high as the part itself.
     numbers = np.flatnonzero(inner)

@@ -24,31 +24,24 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.kernels import kernel
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation, Grid
 from .doubt import doubtful_ground
+from .filling import fill_unknown
 from .lowest_points import default_cell, lowest_surface, mean_above
+from .objects import objects_of
 
-__all__ = ["elevation_from_points", "fill_unknown", "filtered_ground", "ground_surface"]
+__all__ = ["elevation_from_points", "filtered_ground", "ground_surface"]
 
 _Floats = NDArray[np.float32]
 _Mask = NDArray[np.bool_]
 
 #: Size in metres of the blocks whose lowest heights give the trend.
 _TREND_BLOCK = 5.0
-#: Windows up to this radius in metres remove objects without the test for walls: shrubs and crowns have ragged borders.
-_NARROW = 6.0
-#: Gaps of the points wider than twice this, metres, are no surface between what lies around: water, the scene's rim.
-_GAP = 3.0
 #: Points put on the grid at a time, so that a large cloud is not copied.
 _CHUNK = 2_000_000
-#: Metres within which the step of a smooth surface rises from its foot to its top.
-_SMOOTH_STEP = 4.0
 #: Share of the scene under objects from which the trend is fitted again without them.
 _CROWDED = 0.3
-#: Share of the border of a wide object that must be wall.
-_WALLED = 0.7
 
 
 def ground_surface(
@@ -112,13 +105,13 @@ def filtered_ground(
         return Elevation(lowest, grid), np.ones(lowest.shape, dtype=bool)
     trend = _trend(lowest, grid.gsd, largest_object)
     relief = lowest - trend
-    objects = _objects(relief, grid.gsd, largest_object, slope, wall_height)
+    objects = objects_of(relief, grid.gsd, largest_object, slope, wall_height)
     if objects.mean() > _CROWDED:
         # Roofs that cover most of a neighbourhood lift its trend: the trend of the rest is that of the land. What is
         # left between them is narrow, so that the feet of smooth steps may not count as ground.
         trend = _trend(np.where(objects, np.float32(np.nan), lowest), grid.gsd, largest_object)
         relief = lowest - trend
-        objects = _objects(relief, grid.gsd, largest_object, slope, wall_height, feet=True)
+        objects = objects_of(relief, grid.gsd, largest_object, slope, wall_height, feet=True)
     ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
     # Cut hill tops and the feet of shrubs come back; what they add lets the next round reach a little further.
     for _ in range(2):
@@ -170,70 +163,6 @@ def elevation_from_points(
     mean = np.full(size, np.nan)
     np.divide(total, count, out=mean, where=count > 0)
     return Elevation(fill_unknown((mean + base).astype(np.float32).reshape(grid.shape)), grid)
-
-
-def fill_unknown(values: _Floats) -> _Floats:
-    """Return the values with NaN replaced by a smooth surface through the known ones (all NaN stays NaN).
-
-    Pull and push: unknown cells take the bilinear value of the filled grid of half the resolution, and each level is
-    then relaxed towards the mean of the four neighbours (membrane), so that a gap in a slope is filled along it.
-    """
-    known = np.isfinite(values)
-    if known.all() or not known.any():
-        return values.astype(np.float32)
-    # Heights above sea are large against the float32 step of their sums.
-    base = np.float32(values[known].mean())
-    filled = _pull_push(np.where(known, values - base, 0).astype(np.float32), known)
-    filled += base
-    filled[known] = values[known]
-    return filled
-
-
-def _pull_push(values: _Floats, known: _Mask) -> _Floats:
-    import cv2
-
-    rows, columns = values.shape
-    if not known.all() and max(rows, columns) > 1:
-        even = ((0, rows % 2), (0, columns % 2))
-        weight = _blocks(np.pad(known.astype(np.float32), even))
-        total = _blocks(np.pad(values * known, even))
-        mean: _Floats = (total / np.maximum(weight, 1)).astype(np.float32)
-        coarse = _pull_push(mean, weight > 0)
-        finer = cv2.resize(coarse, (columns + columns % 2, rows + rows % 2), interpolation=cv2.INTER_LINEAR)
-        values = np.where(known, values, finer[:rows, :columns])
-        _relax(values, known, 20)
-    return values
-
-
-def _blocks(values: _Floats) -> _Floats:
-    return values[::2, ::2] + values[1::2, ::2] + values[::2, 1::2] + values[1::2, 1::2]
-
-
-@kernel
-def _relax(values: _Floats, known: _Mask, rounds: int) -> None:
-    """Move unknown cells to the mean of their neighbours, in place, `rounds` sweeps in alternating order."""
-    rows, columns = values.shape
-    for sweep in range(rounds):
-        for i in range(rows):
-            r = i if sweep % 2 == 0 else rows - 1 - i
-            for j in range(columns):
-                c = j if sweep % 2 == 0 else columns - 1 - j
-                if known[r, c]:
-                    continue
-                total, count = 0.0, 0
-                if r > 0:
-                    total += values[r - 1, c]
-                    count += 1
-                if r < rows - 1:
-                    total += values[r + 1, c]
-                    count += 1
-                if c > 0:
-                    total += values[r, c - 1]
-                    count += 1
-                if c < columns - 1:
-                    total += values[r, c + 1]
-                    count += 1
-                values[r, c] = total / count
 
 
 def _finite(points: PointCloud) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -298,107 +227,3 @@ def _local_planes(height: NDArray[np.float64], weight: NDArray[np.float64], sigm
     determinant = xx * yy - xy * xy
     across, down = (xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant
     return np.asarray(mz + across * (x - mx) + down * (y - my))
-
-
-def _objects(
-    relief: _Floats, cell: float, largest: float, slope: float, wall_height: float, *, feet: bool = False
-) -> _Mask:
-    """Return the cells of objects: removed by an opening and, where the window is wide, standing on walls.
-
-    With `feet`, cells around an object that its step leaves above the ground belong to it.
-    """
-    import cv2
-
-    objects = np.zeros(relief.shape, dtype=bool)
-    # Gaps within the scene are filled, and what was measured nowhere around is like what lies beyond the scene.
-    beyond = _beyond(np.isnan(relief), _GAP / cell)
-    surface, walls = fill_unknown(relief), None
-    for radius in _radii(largest / 2 / cell, min(relief.shape)):
-        if radius * cell > _NARROW and walls is None:
-            # Narrower windows have taken the trees off: what steps down in the surface between them is a roof.
-            walls = _wall_cells(surface, wall_height, cell)
-        window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * radius + 1, 2 * radius + 1))
-        # Windows centred beyond the border would contain only the rim of a roof.
-        lowest = cv2.erode(np.where(beyond, np.float32(np.inf), surface), window)
-        opened = cv2.dilate(np.where(beyond, np.float32(-np.inf), lowest), window)
-        removed = ~beyond & (surface - opened > np.minimum(0.3 + slope * radius * cell, 2.0))
-        if walls is not None:
-            removed = _standing(removed, walls, beyond)
-            if feet:
-                removed |= _foot(removed, surface - opened, cell) & ~beyond
-            # Where a wing of a roof was removed, the border of the rest counts as wall, too.
-            walls |= cv2.dilate(removed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        objects |= removed
-        surface = np.where(removed, opened, surface)
-    return objects
-
-
-def _radii(largest: float, size: int) -> list[int]:
-    """Window radii in cells, 1, 2, 3, 4, 6, 8, 12 ... up to the largest, none wider than the grid."""
-    radii, radius = [], 1.0
-    while True:
-        radii.append(round(radius))
-        if radius >= largest or 2 * radius + 1 >= size:
-            return sorted(set(radii))
-        radius = min(radius + max(1.0, radius * 0.41), largest)
-
-
-def _foot(removed: _Mask, above: _Floats, cell: float) -> _Mask:
-    """Return the cells around an object that a smooth step leaves above the ground."""
-    import cv2
-
-    reach = 2 * round(_SMOOTH_STEP / 2 / cell) + 1
-    around = cv2.dilate(removed.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))) > 0
-    return np.asarray(around & (above > 0.3))
-
-
-def _wall_cells(relief: _Floats, height: float, cell: float) -> _Mask:
-    """Return the cells above a step, and those around the steps of a smooth surface.
-
-    A cell is above a step when the fall within two cells, less half the rise, exceeds `height`: a steep slope rises as
-    much as it falls; the border of a roof falls to the ground and rises to its ridge at most. Surfaces of image
-    matching and rasters have smooth steps. Within `_SMOOTH_STEP` metres the fall must be higher in proportion, and the
-    border of the object lies at the foot of the step, as far away.
-    """
-    import cv2
-
-    walls = _above_step(relief, 2, height)
-    reach = round(_SMOOTH_STEP / cell)
-    if reach > 2:
-        window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-        smooth = _above_step(relief, reach, 0.75 * height * reach)
-        walls |= cv2.dilate(smooth.astype(np.uint8), window) > 0
-    return walls
-
-
-def _above_step(relief: _Floats, reach: int, height: float) -> _Mask:
-    """Return the cells where the fall within `reach` cells, less half the rise, exceeds `height`."""
-    import cv2
-
-    window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    fall = relief - cv2.erode(relief, window)
-    rise = cv2.dilate(relief, window) - relief
-    return np.asarray(fall - rise / 2 > height)
-
-
-def _beyond(unknown: _Mask, reach: float) -> _Mask:
-    """Return the unknown cells of gaps that a square reaching so many cells to all sides fits into."""
-    import cv2
-
-    # What lies around the grid is unknown, too.
-    window = np.ones((2 * round(reach) + 1,) * 2, np.uint8)
-    shrunk = cv2.erode(unknown.astype(np.uint8), window, borderValue=1)
-    return np.asarray((cv2.dilate(shrunk, window) > 0) & unknown)
-
-
-def _standing(removed: _Mask, walls: _Mask, beyond: _Mask) -> _Mask:
-    """Return the removed cells of the regions whose border is wall; where nothing is known beyond it is no border."""
-    import cv2
-
-    count, labels = cv2.connectedComponents(removed.astype(np.uint8), connectivity=4)
-    inner = cv2.erode((removed | beyond).astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1)
-    border = removed & (inner == 0)
-    length = np.bincount(labels[border], minlength=count)
-    walled = np.bincount(labels[border & walls], minlength=count)
-    stands = walled >= _WALLED * np.maximum(length, 1)
-    return np.asarray(removed & stands[labels])

@@ -29,7 +29,8 @@ from numpy.typing import NDArray
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation, Grid
 from .doubt import doubt_note
-from .filter import fill_unknown, filtered_ground
+from .filling import fill_unknown
+from .filter import filtered_ground
 
 __all__ = ["HIGHEST_LAND", "LOWEST_LAND", "SEAM", "Heights", "heights_of"]
 

@@ -24,7 +24,7 @@ _GROUND, _WATER = 2, 9
 
 def dem_of(place: Place, models: Sequence[RasterHeader], cell: float | None, points: PointCloud | None) -> Elevation:
     """Return the mosaic of elevation models with its gaps filled, compared with the points."""
-    from ..ground.filter import fill_unknown
+    from ..ground.filling import fill_unknown
 
     files = [header.path for header in models]
     if not any(common_extent(place.extent, warped_extent(model, place.crs)) for model in models):

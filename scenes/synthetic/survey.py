@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from ..geodata.raster import Elevation, Grid
-from ..ground.filter import fill_unknown
+from ..ground.filling import fill_unknown
 from .streams import fractal_field, stream
 from .surface import rasterise
 from .world import World

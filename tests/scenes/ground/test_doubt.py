@@ -36,6 +36,17 @@ def test_a_raised_part_is_doubtful_and_slopes_pits_and_terraces_are_not():
     assert not doubts(np.where(row > 100, 12.0, 0.0)).any()
 
 
+def test_a_part_that_the_border_cuts_is_doubtful_and_the_upper_side_of_a_cliff_is_not():
+    row, column = np.indices(GRID.shape)
+    for part in ((row < 120) & (column < 130), (row > 90) & (abs(column - 100) < 60)):
+        found = doubts(np.where(part, 12.0, 0.0))
+        assert found[part].mean() > 0.9
+        assert not found[~part].any()
+        assert not doubts(np.where(part, -12.0, 0.0)).any()
+    for edge in (60, 140):
+        assert not doubts(np.where(row < edge + 8 * np.sin(column / 20), 12.0, 0.0)).any()
+
+
 def test_a_scene_without_a_dem_notes_the_doubtful_share_and_keeps_the_map():
     y, x = np.mgrid[:240, :240] + 0.5
     hall = (abs(x - 120) < 100) & (abs(y - 120) < 55)

@@ -6,7 +6,8 @@ from shapely.affinity import rotate
 
 from roofbench.scenes.geodata.points import PointCloud
 from roofbench.scenes.geodata.raster import Elevation, Grid
-from roofbench.scenes.ground.filter import elevation_from_points, fill_unknown, ground_surface
+from roofbench.scenes.ground.filling import fill_unknown
+from roofbench.scenes.ground.filter import elevation_from_points, ground_surface
 from roofbench.scenes.ground.lowest_points import default_cell, lowest_surface, mean_above
 
 EXTENT = (1000.0, 2000.0, 1160.0, 2120.0)
@@ -78,6 +79,29 @@ def test_a_large_building_at_an_angle_is_removed_although_windows_fit_its_middle
     points.z[inside] += 17
     error = ground_surface(points, EXTENT).sample(points.x, points.y) - truth
     assert np.abs(error).max() < 0.3
+
+
+@pytest.mark.parametrize("spacing", [1.0, 2.0])
+@pytest.mark.parametrize(("width", "depth"), [(220, 85), (120, 100)])
+def test_a_hall_that_the_border_of_the_scene_cuts_is_removed_and_the_upper_side_of_a_cliff_stays(spacing, width, depth):
+    extent, west = (0.0, 0.0, 320.0, 240.0), 0.0 if width == 120 else 50.0
+    x, y = (axis.ravel() for axis in np.meshgrid(*(np.arange(spacing / 2, end, spacing) for end in extent[2:])))
+    hall = (x > west) & (x < west + width) & (y < depth)
+    truth = 0.05 * y
+    ground = ground_surface(PointCloud(x, y, truth + np.where(hall, 9.0, 0.0)), extent)
+    assert np.percentile(np.abs(ground.sample(x, y) - truth)[hall], 90) < 2.0
+    upper = y < 100
+    ground = ground_surface(PointCloud(x, y, np.where(upper, 12.0, 0.0)), extent)
+    assert ground.sample(x[upper], y[upper]).mean() > 11
+
+
+@pytest.mark.parametrize("spacing", [0.5, 1.0, 2.0])
+def test_an_embankment_is_no_wall_at_any_cell_size(spacing):
+    extent = (0.0, 0.0, 300.0, 300.0)
+    x, y = (axis.ravel() for axis in np.meshgrid(*(np.arange(spacing / 2, 300, spacing),) * 2))
+    truth = np.clip(15 - np.maximum(np.hypot(x - 150, y - 150) - 70, 0) * 0.7, 0, 15)
+    error = ground_surface(PointCloud(x, y, truth), extent).sample(x, y) - truth
+    assert np.abs(error).max() < 2.0
 
 
 def test_steep_wooded_hills_are_not_cut_off():
