@@ -6,8 +6,9 @@ profile
     Heights inside a rectangle on a lattice of `_LATTICE`, one row for each station along its longer side, one column
     for each line across; NaN where the cell is not high. The outermost lines are left out: eaves and gutters.
 step
-    Median over the lines of the height just behind a station less that just before it, and the share of the lines that
-    agree in sign and exceed the noise.
+    Median over the lines of the height just behind a station less that just before it and less what the roof rises
+    there anyway, which is the mean of its rise on both sides: a slope is no step. And the share of the lines that agree
+    in sign and exceed the noise.
 valley
     Median over the lines of how far a station lies below the roof on both sides, and the share of the lines with one:
     the gutter between two gables that face the street.
@@ -55,7 +56,7 @@ __all__ = [
 
 #: Metres: spacing of the lattice, narrowest house, smallest depth of a rectangle with walls (the front or the rear half
 #: of a row often has one of its own), widest house of a row (median).
-_LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 3.5, 12.0
+_LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 2.5, 12.0
 #: Stations that a mean reaches on either side, and that lie between a valley and its shoulders.
 _REACH, _SHOULDER = 2, 2
 #: Stations that the mean of colours reaches on either side: they are blurred by a pixel, and pixels are displaced.
@@ -108,7 +109,7 @@ class WallRule(NamedTuple):
 
 
 CERTAIN = WallRule(0.75, 0.25, 0.75, 0.4, 0.75, 0.02, 0.65, 0.15, False)
-PROBABLE = WallRule(0.5, 0.1, 0.5, 0.15, 0.6, 0.01, 0.65, 0.1, True)
+PROBABLE = WallRule(0.5, 0.1, 0.5, 0.15, 0.6, 0.005, 0.65, 0.1, True)
 
 
 class Wall(NamedTuple):
@@ -248,7 +249,7 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     means = station_means(profile, _REACH)  # of stations i to i + _REACH - 1
     before, behind = np.full_like(profile, np.nan), np.full_like(profile, np.nan)
     before[_REACH:], behind[: len(means)] = means[: count - _REACH], means
-    step = behind - before
+    step = behind - before - _slope(before, behind)
     known = np.isfinite(step)
     middle = line_medians(step)
     agree = known & (np.sign(step) == np.sign(middle)[:, None]) & (np.abs(step) > _STEP_NOISE)
@@ -270,6 +271,15 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     sunk = (known.mean(axis=1) >= _KNOWN_VALLEY) & (share >= rule.valley_share) & (middle >= rule.valley)
     strength[sunk] += middle[sunk]
     return strength
+
+
+def _slope(before: Floats, behind: Floats) -> Floats:
+    """Return by how much a roof rises from just before a station to just behind it where no step is, m."""
+    rises = np.full((2, *before.shape), np.nan)
+    rises[0, _REACH:], rises[1, :-_REACH] = before[_REACH:] - before[:-_REACH], behind[_REACH:] - behind[:-_REACH]
+    known = np.isfinite(rises)
+    mean: Floats = np.where(known, rises, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return mean
 
 
 def raised_strength(rise: Floats, stacks: Floats | None, rule: WallRule) -> Floats:

@@ -31,7 +31,7 @@ from ...scenes.geodata.raster import Grid, Image
 from .arrays import Rectangles
 from .bends import count_bends
 from .buildings import block_of, outline_buildings
-from .party_walls import CERTAIN, PROBABLE, Profile, Wall, most_walls, party_walls, profile_of
+from .party_walls import CERTAIN, PROBABLE, Wall, most_walls, party_walls, profile_of
 from .rectangles import to_world
 from .wall_colours import colours_of
 
@@ -40,8 +40,8 @@ __all__ = ["Levels", "find_levels"]
 #: Certain party walls that make a row of a block, and of one of `_LONG` metres or more that is `_SLENDER` times as long
 #: as wide or more.
 _CERTAIN_WALLS, _WALLS_OF_LONG = 3, 2
-#: Certain party walls that one part of a row has at least.
-_REPEATED = 2
+#: Certain party walls that one part of a row has at least, and probable ones of one part that make each other certain.
+_REPEATED, _MANY = 2, 5
 _LONG, _SLENDER = 25.0, 2.0
 #: Metres: shortest row. Villas of two or three wings have as many steps and valleys, but are shorter.
 _SHORTEST = 22.5
@@ -116,12 +116,13 @@ def find_levels(
     # Most blocks are too small for a row, whatever their roofs look like.
     looked_at = inside & np.append(_are_rows(blocks, room), False)[block]
     certain = np.zeros(len(rectangles), dtype=np.int64)
-    profiles: dict[int, Profile | None] = {}
+    probable: dict[int, list[Wall]] = {}
     image = image_of() if looked_at.any() else None
     colours = {number: colours_of(blocks[number], image, grid) for number in np.unique(block[looked_at]).tolist()}
     for k in np.flatnonzero(looked_at).tolist():
-        profiles[k] = profile_of(rectangles[k], height, state, grid, colours[block[k]], structures)
-        certain[k] = len(party_walls(profiles[k], CERTAIN, grid))
+        profile = profile_of(rectangles[k], height, state, grid, colours[block[k]], structures)
+        probable[k] = party_walls(profile, PROBABLE, grid)
+        certain[k] = len(probable[k] if len(probable[k]) >= _MANY else party_walls(profile, CERTAIN, grid))
     walls_of_block = np.bincount(block[inside], weights=certain[inside], minlength=len(blocks))
     for number in np.unique(block[looked_at]).tolist():
         members = np.flatnonzero(block == number)
@@ -154,7 +155,7 @@ def find_levels(
             buildings.append(blocks[number])
             block_of_building.append(number)
             continue
-        walls = [party_walls(profiles[k], PROBABLE, grid) for k in members.tolist()]
+        walls = [probable[k] for k in members.tolist()]
         pieces, owners = _pieces(rectangles[members], blocks[number], walls, grid)
         group = _houses(pieces, owners)
         parts += pieces

@@ -8,7 +8,8 @@ clouds
     The folders as they are.
 rasters
     The highest point of each cell of 0.5 m, or of 1 m where points are farther apart than 0.5 m, gaps filled by the
-    nearest cell: what ``roofbench scenes import --dsm`` makes of a surface model. Without images.
+    nearest cell: what ``roofbench scenes import --dsm`` makes of a surface model. Without images. Four rasters of each
+    folder, with cells that begin half a cell apart: one raster alone decides by chance.
 images
     Folders with an image in colours, as first returns without numbers and as rasters, and presets whose points record
     no number of returns (``level=part``, as their references have a rectangle for each wing). The first scene of each
@@ -39,6 +40,8 @@ from roofbench.scenes.geodata.raster import Grid
 
 #: Metres: cells of rasters, and of those of points that are farther apart than the first.
 FINE, COARSE = 0.5, 1.0
+#: Cells by which the rasters of one scene are displaced, west and north.
+SHIFTS = ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5))
 #: Presets whose references have a rectangle for each wing.
 OF_PARTS = ("knox", "moonee-ponds", "toronto-a")
 #: Presets of the studies of images and of walls.
@@ -117,11 +120,12 @@ def first_returns(scene):
     return with_points(scene, replace(first, return_number=None, number_of_returns=None), scene.image)
 
 
-def rastered(scene, image=None):
-    """Return a scene of the highest points of cells, gaps filled by the nearest cell."""
+def rastered(scene, image=None, shift=(0.0, 0.0)):
+    """Return a scene of the highest points of cells, gaps filled by the nearest cell; the shift is in cells."""
     points = scene.points
-    spacing = point_spacing(points.x, points.y, scene.extent)
-    grid = Grid.covering(scene.extent, FINE if spacing <= FINE else COARSE)
+    cell = FINE if point_spacing(points.x, points.y, scene.extent) <= FINE else COARSE
+    grid = Grid.covering(scene.extent, cell)
+    grid = replace(grid, west=grid.west - shift[0] * cell, north=grid.north + shift[1] * cell)
     row, column = (np.floor(place).astype(int) for place in grid.to_pixel(points.x, points.y))
     inside = (row >= 0) & (row < grid.rows) & (column >= 0) & (column < grid.columns)
     top = np.full(grid.shape, -np.inf)
@@ -139,7 +143,7 @@ def scenes_of(study, folders, seeds):
     if study == "clouds":
         return places
     if study == "rasters":
-        return {name: rastered(scene) for name, scene in places.items()}
+        return {f"{name} {shift}": rastered(scene, None, shift) for name, scene in places.items() for shift in SHIFTS}
     found = {}
     if study == "walls":
         found = {name: scene for name, scene in places.items() if name.startswith("delft")}

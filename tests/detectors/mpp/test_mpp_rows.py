@@ -79,7 +79,7 @@ def test_low_steps_are_probable_but_not_certain():
     [
         (flat, (10, 10, 60, 20)),  # a hall
         (steps(25.0, 10.0, 1.0), (10, 10, 110, 22)),  # four large buildings, too wide for houses
-        (gables(6.0, 10.0), (10, 10, 46, 13)),  # too shallow
+        (gables(6.0, 10.0), (10, 10, 46, 12)),  # too shallow
         (gables(3.0, 10.0), (10, 10, 17, 20)),  # too short for two houses
         (lambda x, y: 9 - np.abs(y - 15), (10, 10, 60, 20)),  # one ridge along all of it
     ],
@@ -132,6 +132,15 @@ def u(x, y):
     return (x - 65) * math.cos(math.radians(30)) + (y - 40) * math.sin(math.radians(30)) + 18
 
 
+def test_a_slope_along_the_row_is_no_step():
+    stations = np.arange(40)[:, None] * np.ones((1, 12))
+    slope = 6 + 0.1 * stations
+    assert wall_strength(slope, PROBABLE).max() < 1e-9
+    stepped = wall_strength(slope + np.where(stations < 20, 0, 0.5), PROBABLE)
+    assert stepped.argmax() == 20
+    assert stepped[20] >= 0.5
+
+
 def slow_strength(profile, rule):
     """The definition of a wall's strength, station by station and line by line."""
 
@@ -150,7 +159,11 @@ def slow_strength(profile, rule):
         for k in range(lines):
             jump = valley = math.nan
             if i >= 2 and i + 2 <= stations:
-                jump = mean(profile[i : i + 2, k]) - mean(profile[i - 2 : i, k])
+                before, behind = mean(profile[i - 2 : i, k]), mean(profile[i : i + 2, k])
+                earlier = mean(profile[i - 4 : i - 2, k]) if i >= 4 else math.nan
+                later = mean(profile[i + 2 : i + 4, k]) if i + 4 <= stations else math.nan
+                rises = [rise for rise in (before - earlier, later - behind) if not math.isnan(rise)]
+                jump = behind - before - (sum(rises) / len(rises) if rises else 0.0)
             if i >= 4 and i + 4 <= stations:
                 lows = [value for value in profile[i - 1 : i + 1, k] if not math.isnan(value)]
                 shoulders = (mean(profile[i - 4 : i - 2, k]) + mean(profile[i + 2 : i + 4, k])) / 2
@@ -248,6 +261,13 @@ def test_a_house_with_a_wing_is_one_building_and_a_part_outside_blocks_another()
 def test_a_long_row_needs_fewer_walls_than_a_short_block(houses, length, buildings):
     sides = (10, 10, 10 + length, 20)
     found, _ = levels([(sides, steps(length / houses, 10.0, 0.6))], [rectangle(*sides)])
+    assert len(found.buildings) == buildings
+
+
+@pytest.mark.parametrize(("length", "buildings"), [(36, 6), (30, 1)])
+def test_five_probable_walls_of_one_part_make_a_row_and_four_do_not(length, buildings):
+    sides = (10, 10, 10 + length, 20)
+    found, _ = levels([(sides, steps(6.0, 10.0, 0.18))], [rectangle(*sides)])
     assert len(found.buildings) == buildings
 
 
