@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 import shutil
+import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -21,6 +23,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from ....core.processes import death_reason
 from ....scenes.folder import open_scene
 from ....scenes.geodata.density import point_spacing
 from ....scenes.geodata.footprints import Footprints
@@ -31,7 +34,16 @@ from ....scenes.geodata.vector_files import write_footprints
 from ...shared.morphology import closed, opened
 from ...shared.regularise import regularise
 
-__all__ = ["DEFAULTS", "RecipeCall", "leave", "read_call", "require_program", "required_module", "write_buildings"]
+__all__ = [
+    "DEFAULTS",
+    "RecipeCall",
+    "leave",
+    "read_call",
+    "require_program",
+    "required_module",
+    "run_tool",
+    "write_buildings",
+]
 
 #: Exit code that says that the tool or an input is missing.
 _SKIP = 77
@@ -70,9 +82,11 @@ def read_call(**defaults: Any) -> RecipeCall:
     folder, parameters, output = map(Path, sys.argv[1:])
     given = json.loads(parameters.read_text(encoding="utf-8"))
     known = {**DEFAULTS, **defaults}
-    for name in given:
+    for name, value in given.items():
         if name not in known and name != "seed":
             sys.exit(f"no setting {name!r}: there are {', '.join(known)}")
+        if type(value) not in (int, float) or not 0 <= value < math.inf:
+            sys.exit(f"the setting {name} must be a number of at least 0, not {json.dumps(value)}")
     scene = open_scene(folder)
     assert scene.points is not None
     return RecipeCall(folder, {**known, **given}, output, scene.points, scene.extent, scene.crs)
@@ -90,6 +104,15 @@ def require_program(name: str, package: str) -> None:
     """Exit with the code for a missing tool unless there is an executable of that name."""
     if shutil.which(name) is None:
         leave(f"{name} is not installed: it is part of {package}")
+
+
+def run_tool(words: Sequence[str]) -> None:
+    """Run a program of the tool; where it fails, exit with its code, so that its last line is the reason."""
+    code = subprocess.run(words, check=False).returncode  # noqa: S603 - the program of the recipe
+    if code < 0:
+        print(death_reason(code, words[0]), file=sys.stderr)
+    if code:
+        sys.exit(code if 0 < code != _SKIP else 1)
 
 
 def write_buildings(call: RecipeCall, on_building: NDArray[np.bool_]) -> None:

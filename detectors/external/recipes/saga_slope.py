@@ -6,14 +6,13 @@ above the nearest ground cell are taken as buildings; the opening in `write_buil
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import NearestNDInterpolator
 
-from .recipe_scene import read_call, require_program, write_buildings
+from .recipe_scene import read_call, require_program, run_tool, write_buildings
 
 __all__ = ["main"]
 
@@ -40,8 +39,7 @@ def main() -> None:
 
 
 def _saga(library: str, tool: str, **options: str) -> None:
-    words = ["saga_cmd", "--flags=s", library, tool, *(f"-{name}={value}" for name, value in options.items())]
-    subprocess.run(words, check=True)  # noqa: S603 - the program of the recipe
+    run_tool(["saga_cmd", "--flags=s", library, tool, *(f"-{name}={value}" for name, value in options.items())])
 
 
 def _cells(header: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -443,3 +443,24 @@ def test_recipes_run_or_say_what_is_missing(recipe, tmp_path):
     if recipe == "grass":  # it needs pulses with several returns
         return
     assert found.areas.sum() == pytest.approx(12 * 16, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        ("echo no licence; exit 3", r"saga exited with code 3: no licence"),
+        ("kill -9 $$", r"saga exited with code 1: saga_cmd was killed by signal 9"),
+    ],
+)
+def test_the_reason_of_a_broken_tool_is_its_last_line(program, scene, tmp_path, monkeypatch, body, reason):
+    program(body, name="saga_cmd")
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    with pytest.raises(ProgramError, match=reason):
+        rb.detect(scene, "command[recipe=saga]")
+
+
+def test_settings_of_a_recipe_must_be_numbers(program, scene, tmp_path, monkeypatch):
+    program("exit 1", name="saga_cmd")
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    with pytest.raises(ProgramError, match='the setting cell must be a number of at least 0, not "low"'):
+        rb.detect(scene, "command[recipe=saga,settings=cell=low]")
