@@ -59,7 +59,7 @@ def built_cells(rectangles: Rectangles, gsd: float, height: NDArray[np.uint16], 
 
     inside = inside_any(rectangles, state.shape)
     high = state == HIGH
-    around = cv2.GaussianBlur(np.where(high, score, 0).astype(np.float32), (0, 0), _SIGMA / gsd)
+    around = cv2.GaussianBlur(np.multiply(score, high, dtype=np.float32), (0, 0), _SIGMA / gsd)
     sure = inside & (state != LOW)
     core = (high & (around > 0)) | sure
     gaps = high & closed(core, 0.5 * _NARROW / gsd) & ~core
@@ -68,10 +68,11 @@ def built_cells(rectangles: Rectangles, gsd: float, height: NDArray[np.uint16], 
         gaps &= ~_crowns(rising, gaps, _whole(core, sure, gsd))
     built = _whole(core | gaps, sure, gsd)
     built = _with_rims(built, height, high, max(round(_RIM / gsd), 1))
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(built.astype(np.uint8), connectivity=4)
-    kept = np.bincount(labels[inside], minlength=count) >= _CONFIRMED * statistics[:, cv2.CC_STAT_AREA]
+    _, labels = cv2.connectedComponents(built.astype(np.uint8), connectivity=4)
+    cells = np.bincount(labels.ravel())
+    kept = np.bincount(labels[inside], minlength=len(cells)) >= _CONFIRMED * cells
     kept[0] = False
-    return np.asarray(kept[labels])
+    return np.asarray(kept.take(labels))
 
 
 def _whole(built: Mask, sure: Mask, gsd: float) -> Mask:

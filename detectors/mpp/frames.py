@@ -183,10 +183,9 @@ def _lower_boxes(surface: _Surface, boxes: Rectangles) -> None:
         _lower_one(surface, box)
 
 
-@kernel
-def _cell_at(box: Rectangles, u: float, v: float) -> tuple[int, int]:
-    """Return row and column of the cell at u, v from the centre of a box."""
-    cos, sin = math.cos(box[4]), math.sin(box[4])
+@kernel(inline="always")
+def _cell_at(box: Rectangles, cos: float, sin: float, u: float, v: float) -> tuple[int, int]:
+    """Return row and column of the cell at u, v from the centre of a box; cosine and sine of its angle are known."""
     return math.floor(box[1] + u * sin + v * cos), math.floor(box[0] + u * cos - v * sin)
 
 
@@ -198,6 +197,7 @@ def _grow(surface: _Surface, box: Rectangles) -> None:
     """
     height, state = surface.height, surface.state
     rows, columns = state.shape
+    cos, sin = math.cos(box[4]), math.sin(box[4])
     for side in range(4):
         axis, end = side // 2, 1.0 if side % 2 == 0 else -1.0
         for _ in range(_GROWTH):
@@ -207,10 +207,10 @@ def _grow(surface: _Surface, box: Rectangles) -> None:
             out = end * (0.5 * box[2 + axis] + 0.5 * _STRIP)
             for k in range(many):
                 at = ((k + 0.5) / many - 0.5) * along
-                r, c = _cell_at(box, out if axis == 0 else at, at if axis == 0 else out)
+                r, c = _cell_at(box, cos, sin, out if axis == 0 else at, at if axis == 0 else out)
                 if 0 <= r < rows and 0 <= c < columns:
                     back = out - end * _BORDER
-                    i, j = _cell_at(box, back if axis == 0 else at, at if axis == 0 else back)
+                    i, j = _cell_at(box, cos, sin, back if axis == 0 else at, at if axis == 0 else back)
                     inner = 0 <= i < rows and 0 <= j < columns and state[i, j] == HIGH
                     level = not inner or height[r, c] <= height[i, j] + surface.step
                     high += state[r, c] == HIGH and level

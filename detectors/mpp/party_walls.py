@@ -27,6 +27,7 @@ The thresholds were chosen on the development scenes (docs/results/mpp.md), not 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -74,8 +75,8 @@ _STEP_NOISE, _VALLEY_NOISE = 0.12, 0.25
 #: Share of the lines that must have heights for a step, and for a valley.
 _KNOWN_STEP, _KNOWN_VALLEY = 0.6, 0.5
 
-#: Fractions of a cell that places of the lattice are rounded to.
-_FRACTIONS = 1024
+#: Bits of the fractions of a cell that places of the lattice are rounded to.
+_FRACTION_BITS = 10
 #: Decimals of the sides of rectangles, metres.
 _DECIMALS = 6
 
@@ -160,7 +161,7 @@ def profile_of(
     height: NDArray[np.uint16],
     state: NDArray[np.uint8],
     grid: Grid,
-    colours: Colours | None = None,
+    colours: Callable[[], Colours | None] = lambda: None,
     structures: NDArray[np.uint8] | None = None,
 ) -> Profile | None:
     """Return the profile of a rectangle; None where it is too small for houses.
@@ -174,8 +175,8 @@ def profile_of(
     state : ndarray of uint8, shape (rows, columns)
         See `cells`.
     grid : Grid
-    colours : Colours, optional
-        Around the rectangle, where there is an image.
+    colours : callable, optional
+        Returns the colours around the rectangle, where there is an image; called only where they are used.
     structures : ndarray of uint8, shape (rows, columns), optional
         Height of what stands on the roofs, cm.
     """
@@ -190,16 +191,18 @@ def profile_of(
     u, v = first / length, second / depth
     stations = np.arange(_LATTICE / 2, length, _LATTICE)
     lines = np.arange(_LATTICE / 2, depth, _LATTICE)
-    x, y = (place[0] + stations[:, None, None] * u + lines[None, :, None] * v).transpose(2, 0, 1) / grid.gsd
-    column = np.clip(_cell_of(x), 0, grid.columns - 1)
-    row = np.clip(_cell_of(y), 0, grid.rows - 1)
-    high = state[row, column] == HIGH
-    roof = np.where(high, height[row, column] / 100.0, np.nan)
+    x, y = ((place[0, k] + stations[:, None] * u[k] + lines * v[k]) / grid.gsd for k in (0, 1))
+    column = np.minimum(np.maximum(_cell_of(x), 0), grid.columns - 1)
+    row = np.minimum(np.maximum(_cell_of(y), 0), grid.rows - 1)
+    flat = row * state.shape[1] + column
+    high = state.take(flat) == HIGH
+    roof = np.where(high, height.take(flat) / 100.0, np.nan)
     shares = rise = stacks = None
-    if depth <= _DEEPEST and colours is not None:
-        shares = np.where(high, colours_at(colours, row, column), np.nan)
+    around = colours() if depth <= _DEEPEST else None
+    if around is not None:
+        shares = np.where(high, colours_at(around, row, column), np.nan)
     if depth <= _DEEPEST and structures is not None:
-        rise = rises(roof + structures[row, column] / 100.0)
+        rise = rises(roof + structures.take(flat) / 100.0)
         stacks = chimneys(rise) if _is_pitched(roof) else None
     return Profile(place[0], u, v, length, roof, shares, rise, stacks)
 
@@ -222,9 +225,7 @@ def party_walls(profile: Profile | None, rule: WallRule, grid: Grid) -> list[Wal
     if profile.rise is not None:
         strength += raised_strength(profile.rise, profile.chimneys, rule)
     found: list[float] = []
-    for station in np.argsort(-strength, kind="stable"):
-        if strength[station] <= 0:
-            break
+    for station in np.argsort(-strength, kind="stable")[: np.count_nonzero(strength > 0)].tolist():
         at = station * _LATTICE
         inside = _NARROWEST <= at <= profile.length - _NARROWEST
         if inside and all(abs(at - other) >= _NARROWEST for other in found):
@@ -237,7 +238,8 @@ def party_walls(profile: Profile | None, rule: WallRule, grid: Grid) -> list[Wal
 
 def _cell_of(place: Floats) -> NDArray[np.int64]:
     """Return the cells of places in cells; on a border the same one whatever cell a window of the scene begins with."""
-    return np.floor(np.round(place * _FRACTIONS) / _FRACTIONS).astype(np.int64)
+    parts: NDArray[np.int64] = np.rint(place * 2**_FRACTION_BITS).astype(np.int64)
+    return parts >> _FRACTION_BITS
 
 
 def wall_strength(profile: Floats, rule: WallRule) -> Floats:
@@ -252,10 +254,9 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     step = behind - before - _slope(before, behind)
     known = np.isfinite(step)
     middle = line_medians(step)
-    agree = known & (np.sign(step) == np.sign(middle)[:, None]) & (np.abs(step) > _STEP_NOISE)
-    enough = known.mean(axis=1) >= _KNOWN_STEP
-    share = agree.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    stepped = enough & (share >= rule.step_share) & (np.abs(middle) >= rule.step)
+    stepped = (known.mean(axis=1) >= _KNOWN_STEP) & (np.abs(middle) >= rule.step)
+    agree = step[stepped] * np.sign(middle[stepped])[:, None] > _STEP_NOISE
+    stepped[stepped] = agree.sum(axis=1) / known[stepped].sum(axis=1) >= rule.step_share
     strength[stepped] += np.abs(middle[stepped])
 
     low = np.full_like(profile, np.nan)
@@ -267,8 +268,8 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     valley = (left + right) / 2 - low
     known = np.isfinite(valley)
     middle = line_medians(valley)
-    share = (known & (valley > _VALLEY_NOISE)).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    sunk = (known.mean(axis=1) >= _KNOWN_VALLEY) & (share >= rule.valley_share) & (middle >= rule.valley)
+    sunk = (known.mean(axis=1) >= _KNOWN_VALLEY) & (middle >= rule.valley)
+    sunk[sunk] = (valley[sunk] > _VALLEY_NOISE).sum(axis=1) / known[sunk].sum(axis=1) >= rule.valley_share
     strength[sunk] += middle[sunk]
     return strength
 
@@ -321,9 +322,9 @@ def colour_strength(shares: Floats, rule: WallRule) -> Floats:
     middle = np.stack([line_medians(edge) for edge in edges])
     size = np.hypot(*middle)
     known = np.isfinite(edges).all(axis=0)
-    along = (edges * middle[:, :, None]).sum(axis=0) / np.maximum(size, 1e-12)[:, None]
-    agree = known & (along > _COLOUR_NOISE * rule.colour)
-    share = agree.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    seen = (known.mean(axis=1) >= _KNOWN_COLOUR) & (share >= rule.colour_share) & (size >= rule.colour)
+    seen = (known.mean(axis=1) >= _KNOWN_COLOUR) & (size >= rule.colour)
+    along = (edges[:, seen] * middle[:, seen, None]).sum(axis=0) / size[seen, None]
+    agree = (along > _COLOUR_NOISE * rule.colour).sum(axis=1)
+    seen[seen] = agree / known[seen].sum(axis=1) >= rule.colour_share
     strength[seen] = _COLOUR_METRES * size[seen]
     return strength

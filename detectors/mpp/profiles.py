@@ -16,9 +16,10 @@ __all__ = ["line_medians", "station_means"]
 def station_means(profile: Floats, reach: int) -> Floats:
     """Return the mean of the known heights of `reach` stations in a row, shape (stations - reach + 1, lines)."""
     known = np.isfinite(profile)
-    total = np.cumsum(np.vstack([np.zeros((1, profile.shape[1])), np.where(known, profile, 0.0)]), axis=0)
-    number = np.cumsum(np.vstack([np.zeros((1, profile.shape[1]), dtype=np.int64), known]), axis=0)
-    total, number = total[reach:] - total[:-reach], number[reach:] - number[:-reach]
+    sums = np.zeros((2, len(profile) + 1, profile.shape[1]))
+    np.cumsum(np.where(known, profile, 0.0), axis=0, out=sums[0, 1:])
+    np.cumsum(known, axis=0, dtype=np.float64, out=sums[1, 1:])
+    total, number = sums[:, reach:] - sums[:, :-reach]
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 

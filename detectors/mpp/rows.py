@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,7 @@ from .bends import count_bends
 from .buildings import block_of, outline_buildings
 from .party_walls import CERTAIN, PROBABLE, Wall, most_walls, party_walls, profile_of
 from .rectangles import to_world
-from .wall_colours import colours_of
+from .wall_colours import Colours, colours_of
 
 __all__ = ["Levels", "find_levels"]
 
@@ -118,9 +119,13 @@ def find_levels(
     certain = np.zeros(len(rectangles), dtype=np.int64)
     probable: dict[int, list[Wall]] = {}
     image = image_of() if looked_at.any() else None
-    colours = {number: colours_of(blocks[number], image, grid) for number in np.unique(block[looked_at]).tolist()}
+
+    @cache
+    def colours(number: int) -> Colours | None:
+        return colours_of(blocks[number], image, grid)
+
     for k in np.flatnonzero(looked_at).tolist():
-        profile = profile_of(rectangles[k], height, state, grid, colours[block[k]], structures)
+        profile = profile_of(rectangles[k], height, state, grid, partial(colours, block[k]), structures)
         probable[k] = party_walls(profile, PROBABLE, grid)
         certain[k] = len(probable[k] if len(probable[k]) >= _MANY else party_walls(profile, CERTAIN, grid))
     walls_of_block = np.bincount(block[inside], weights=certain[inside], minlength=len(blocks))

@@ -112,7 +112,9 @@ def _without_long(
     if division is None:
         return mask
     labels, count = label_patches(height, mask, round(100 * step), threads=threads)
-    return np.asarray((labels > 0) & ~_too_long(labels, count, division)[labels])
+    kept = ~_too_long(labels, count, division)
+    kept[0] = False
+    return kept.take(labels)
 
 
 def _lower_storeys(

@@ -48,5 +48,7 @@ def colours_at(colours: Colours, row: NDArray[np.int64], column: NDArray[np.int6
     _, rows, columns = colours.shares.shape
     row, column = row - colours.top, column - colours.left
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    found = colours.shares[:, np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
-    return np.where(inside, found.astype(np.float64), np.nan)
+    flat = np.where(inside, row * columns + column, 0)
+    found: Floats = colours.shares.reshape(2, -1).take(flat, axis=1).astype(np.float64)
+    found[:, ~inside] = np.nan
+    return found

