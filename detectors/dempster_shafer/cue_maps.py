@@ -30,6 +30,9 @@ __all__ = ["CueMaps", "cue_maps"]
 
 _Floats = NDArray[np.float32]
 
+#: Least share of the cells with points in which a first and in which a last return is.
+_LEAST_NUMBERED = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class CueMaps:
@@ -41,7 +44,7 @@ class CueMaps:
     height : ndarray
         The surface: height above ground, metres.
     pulse_difference : ndarray or None
-        Metres; None when no pulse has several returns.
+        Metres; None when no pulse has several returns, or the numbers name no first or last return in most cells.
     vegetation : ndarray or None
         Vegetation index of the image.
     strength, directedness : ndarray
@@ -73,14 +76,7 @@ def cue_maps(
     """
     index, inside = grid.cells(points.x, points.y)
     used = inside & np.isfinite(heights)
-    number, total = points.return_number, points.number_of_returns
-    several = number is not None and total is not None and bool((total > 1).any())
-    if several:
-        assert number is not None
-        assert total is not None
-        last, first = used & (number == total), used & (number == 1)
-    else:
-        last = first = used
+    first, last, several = _first_and_last(points, used, index, grid)
     surface, known = _mean(index[last], heights[last], grid)
     surface = _nearest_filled(surface, known)
     difference = None
@@ -97,6 +93,24 @@ def cue_maps(
         strength=strength,
         directedness=directedness,
     )
+
+
+def _first_and_last(
+    points: PointCloud, used: NDArray[np.bool_], index: NDArray[np.intp], grid: Grid
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], bool]:
+    """Return which points are first and last returns, and whether they differ; all of them where they are not known.
+
+    Some files write the same numbers at every point, none of which is that of a last return.
+    """
+    number, total = points.return_number, points.number_of_returns
+    if number is None or total is None or not (total > 1).any():
+        return used, used, False
+    first, last = used & (number == 1), used & (number == total)
+    size = grid.rows * grid.columns
+    covered, *numbered = (np.count_nonzero(np.bincount(index[part], minlength=size)) for part in (used, first, last))
+    if min(numbered) < _LEAST_NUMBERED * covered:
+        return used, used, False
+    return first, last, True
 
 
 def _mean(index: NDArray[np.intp], values: NDArray[np.float32], grid: Grid) -> tuple[_Floats, NDArray[np.bool_]]:

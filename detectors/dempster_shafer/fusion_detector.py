@@ -30,6 +30,7 @@ from ...core.parameters import parameter
 from ...scenes.geodata.density import point_spacing
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.outlines import coverage_of_mask, trace
+from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..base import Detector
@@ -174,7 +175,7 @@ class DempsterShafer(Detector):
         near_infrared = scene.image is not None and "nir" in scene.image.bands
         cues = cue_maps(points, scene.heights.above(points), grid, window=self.window, vegetation=index)
         probabilities = self._probabilities(cues, near_infrared)
-        information = self._information(probabilities)
+        information = self._information(probabilities, _unnumbered(points, cues))
         if information.silent:
             cues = _without(cues, information.silent)
             probabilities = self._probabilities(cues, near_infrared)
@@ -211,7 +212,7 @@ class DempsterShafer(Detector):
             ),
         )
 
-    def _information(self, probabilities: dict[str, _Floats]) -> CueInformation:
+    def _information(self, probabilities: dict[str, _Floats], known_silent: Mapping[str, str]) -> CueInformation:
         """Return which cues separate roofs from trees among the high cells; the strength of texture is the anchor."""
         names = {"strength": ANCHOR, "pulse difference": "pulse difference", "vegetation": "vegetation"}
         # Steps are wide: which side of the middle a probability is on separates more than the probability itself.
@@ -219,7 +220,8 @@ class DempsterShafer(Detector):
             name: np.sign(probabilities[cue] - np.float32(0.5)) for cue, name in names.items() if cue in probabilities
         }
         # Texture is a poor expert here: walls are as rough as crowns, and where trees are few it would refute colours.
-        return informative_cues(ratings, probabilities["height"] > 0.5, independent=("vegetation",))
+        high = probabilities["height"] > 0.5
+        return informative_cues(ratings, high, independent=("vegetation",), known_silent=known_silent)
 
     def _step(self, values: NDArray[np.floating] | None, name: str) -> _Floats | None:
         """Return the probability of a cue by the bounds of that name."""
@@ -286,6 +288,14 @@ class DempsterShafer(Detector):
             attributes={"height": heights[number], "support": region_support[number]},
             source=self.name,
         )
+
+
+def _unnumbered(points: PointCloud, cues: CueMaps) -> dict[str, str]:
+    """Return why there is no pulse difference although pulses have several returns; empty where there is one."""
+    total = points.number_of_returns
+    if cues.pulse_difference is not None or total is None or not (total > 1).any():
+        return {}
+    return {"pulse difference": "most cells have no first or no last return"}
 
 
 def _evidence(probabilities: Mapping[str, _Floats]) -> list[Evidence]:

@@ -108,3 +108,20 @@ def test_a_cue_that_says_the_same_everywhere_is_silent_and_named():
     found = rb.detect(seen, "dempster-shafer")
     assert found.metadata["cues"] == [cue for cue in plain.metadata["cues"] if cue != "vegetation"]
     assert "'vegetation' is not used" in found.metadata["notes"][0]
+
+
+@pytest.mark.parametrize(("number", "returns"), [(3, 7), (0, 2), (2, 3), (4, 3)])
+def test_numbers_that_name_no_last_return_are_silent_and_buildings_are_found(number, returns):
+    scene = hamlet(1)
+    columns = {
+        name: np.full(len(scene.points), value, np.uint8)
+        for name, value in {"return_number": number, "number_of_returns": returns}.items()
+    }
+    odd, bare = (
+        rb.Scene(scene.name, scene.extent, points=points, dem=scene.dem, image=scene.image)
+        for points in (replace(scene.points, **columns), replace(scene.points, **dict.fromkeys(columns)))
+    )
+    found, plain = (rb.detect(one, "dempster-shafer") for one in (odd, bare))
+    assert len(found) == len(plain) > 5
+    assert (found.areas == plain.areas).all()
+    assert "'pulse difference' is not used: most cells have no first or no last return" in found.metadata["notes"][0]
