@@ -32,7 +32,7 @@ from .doubt import doubt_note
 from .filling import fill_unknown
 from .filter import filtered_ground
 
-__all__ = ["HIGHEST_LAND", "LOWEST_LAND", "SEAM", "Heights", "heights_of"]
+__all__ = ["HIGHEST_LAND", "LOWEST_LAND", "SEAM", "Heights", "fill_voids", "heights_of"]
 
 #: Elevations outside these, metres, are not land but markers of missing data, other units or errors: the shore of the
 #: Dead Sea and Mount Everest, with room for any zero.
@@ -131,7 +131,7 @@ def heights_of(
     if not known.any():
         notes = "the DEM has no value in the scene: the ground was filtered from the points", *doubts
         return Heights(filtered, notes, doubtful)
-    _fill_voids(ground, known, filtered, grid)
+    fill_voids(ground, known, filtered, grid)
     return Heights(
         Elevation(ground, grid),
         (f"the DEM covers {_share(known)} of the scene: the ground of the rest was filtered from the points",),
@@ -189,8 +189,19 @@ def _on_grid(dem: Elevation, grid: Grid) -> NDArray[np.float32]:
     return found
 
 
-def _fill_voids(ground: NDArray[np.float32], known: NDArray[np.bool_], filtered: Elevation, grid: Grid) -> None:
-    """Fill the voids of a DEM in place with the filtered ground plus the difference that fades along the seam."""
+def fill_voids(ground: NDArray[np.float32], known: NDArray[np.bool_], filtered: Elevation, grid: Grid) -> None:
+    """Fill the voids of a DEM in place with another ground plus the difference that fades along the seam.
+
+    Parameters
+    ----------
+    ground : ndarray of float32, shape (rows, columns)
+        Metres.
+    known : ndarray of bool, shape (rows, columns)
+        False in voids.
+    filtered : Elevation
+        The other ground, known everywhere in the grid.
+    grid : Grid
+    """
     import cv2
 
     x, _ = grid.to_world(0, np.arange(grid.columns) + 0.5)

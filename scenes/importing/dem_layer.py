@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.wording import counted
@@ -12,7 +13,10 @@ from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation
 from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_elevation, warped_extent
-from ..ground.heights import HIGHEST_LAND, LOWEST_LAND
+from ..ground.doubt import doubt_note
+from ..ground.filling import fill_unknown
+from ..ground.filter import elevation_from_points, filtered_ground
+from ..ground.heights import HIGHEST_LAND, LOWEST_LAND, SEAM, fill_voids
 from .place import Place, common_extent, extent_text, file_names, file_paths
 from .raster_layer import check_size, grid_of, note_resampling
 
@@ -20,12 +24,22 @@ __all__ = ["dem_of", "dem_of_points"]
 
 #: ASPRS classes whose points lie on the bare earth: ground and water.
 _GROUND, _WATER = 2, 9
+#: Metres: nineteen of twenty points are not higher above the bare earth than this where any ground is seen, and three
+#: of four not deeper below it.
+_ABOVE, _BELOW = 1.5, 0.75
 
 
-def dem_of(place: Place, models: Sequence[RasterHeader], cell: float | None, points: PointCloud | None) -> Elevation:
-    """Return the mosaic of elevation models with its gaps filled, compared with the points."""
-    from ..ground.filling import fill_unknown
+def dem_of(
+    place: Place,
+    models: Sequence[RasterHeader],
+    cell: float | None,
+    points: PointCloud | None,
+    ground_filter: str | None = None,
+) -> Elevation:
+    """Return the mosaic of elevation models with its gaps filled, compared with the points.
 
+    Narrow gaps are interpolated; gaps that reach beyond `SEAM` take the ground that the points give (`dem_of_points`).
+    """
     files = [header.path for header in models]
     if not any(common_extent(place.extent, warped_extent(model, place.crs)) for model in models):
         raise InputError(
@@ -49,13 +63,31 @@ def dem_of(place: Place, models: Sequence[RasterHeader], cell: float | None, poi
             f"{file_paths(files)} holds no height in {extent_text(place.extent)} (all NaN or no data): "
             "give another DEM, or none, and it is derived from the points"
         )
-    if unknown.any():
-        dem = Elevation(fill_unknown(dem.values), grid)
-        how = place.log.derived["dem"] = f"{unknown.mean():.1%} of its cells had no height and were interpolated"
-        place.log.note(f"{file_names(files)}: {how}")
     if points is not None:
         _compare_heights(place, points, dem, file_names(files))
+    if unknown.any():
+        values, how = _filled(place, dem, points, ground_filter)
+        dem = Elevation(values, grid)
+        how = place.log.derived["dem"] = f"{unknown.mean():.1%} of its cells had no height and {how}"
+        place.log.note(f"{file_names(files)}: {how}")
     return dem
+
+
+def _filled(
+    place: Place, dem: Elevation, points: PointCloud | None, ground_filter: str | None
+) -> tuple[NDArray[np.float32], str]:
+    """Return the values of a DEM with its gaps filled, and how."""
+    import cv2
+
+    known = np.isfinite(dem.values)
+    away = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    if points is not None and float(away.max()) * dem.grid.gsd > SEAM:
+        ground, how, _ = _ground_of_points(place, points, None, ground_filter)
+        if np.isfinite(ground.values).any():
+            values = dem.values.copy()
+            fill_voids(values, known, ground, dem.grid)
+            return values, f"were derived {how}"
+    return fill_unknown(dem.values), "were interpolated"
 
 
 def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_filter: str | None) -> Elevation | None:
@@ -63,24 +95,8 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
 
     None where so few points give no height at all.
     """
-    from ..ground.doubt import doubt_note
-    from ..ground.filter import elevation_from_points, filtered_ground
-
     check_size(place, cell or 1.0, "dem_cell")
-    classes, doubt = points.classification, None
-    if ground_filter == "cloth":
-        from ..ground.cloth import cloth_surface
-
-        dem = cloth_surface(points, place.extent, cell=cell)
-        how = "by a cloth simulation filter"
-    elif ground_filter is None and classes is not None and np.any(classes == _GROUND):
-        dem = elevation_from_points(points, place.extent, cell=cell or 1.0, classes=(_GROUND, _WATER))
-        how = "from the points of classes 2 (ground) and 9 (water), gaps interpolated"
-    else:
-        dem, unsure = filtered_ground(points, place.extent, cell=cell)
-        doubt = doubt_note(unsure)
-        why = ", since no point is classified as ground" if ground_filter is None else ""
-        how = f"by a ground filter (progressive opening){why}"
+    dem, how, doubt = _ground_of_points(place, points, cell, ground_filter)
     if not np.isfinite(dem.values).any():
         place.log.note(
             f"no DEM was derived: {counted(len(points), 'point is', 'points are')} too few or too close to each other"
@@ -93,11 +109,33 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
     return dem
 
 
+def _ground_of_points(
+    place: Place, points: PointCloud, cell: float | None, ground_filter: str | None
+) -> tuple[Elevation, str, str | None]:
+    """Return the bare earth that the points give, how it was derived, and a note on where it is unsure."""
+    classes = points.classification
+    if ground_filter == "cloth":
+        from ..ground.cloth import cloth_surface
+
+        return cloth_surface(points, place.extent, cell=cell), "by a cloth simulation filter", None
+    if ground_filter is None and classes is not None and np.any(classes == _GROUND):
+        dem = elevation_from_points(points, place.extent, cell=cell or 1.0, classes=(_GROUND, _WATER))
+        return dem, "from the points of classes 2 (ground) and 9 (water), gaps interpolated", None
+    dem, unsure = filtered_ground(points, place.extent, cell=cell)
+    why = ", since no point is classified as ground" if ground_filter is None else ""
+    return dem, f"by a ground filter (progressive opening){why}", doubt_note(unsure)
+
+
 def _compare_heights(place: Place, points: PointCloud, dem: Elevation, file: str) -> None:
-    """Warn of heights above different zeros: the lowest points should lie on the bare earth."""
+    """Warn of heights above different zeros: the lowest points should lie on the bare earth, and few below it."""
     every = slice(None, None, max(1, len(points) // 200_000))
-    gap = float(np.percentile(points.z[every] - dem.sample(points.x[every], points.y[every]), 10))
-    if abs(gap) > 3.0:
+    gaps = points.z[every] - dem.sample(points.x[every], points.y[every])
+    gaps = gaps[np.isfinite(gaps)]
+    if not len(gaps):
+        return
+    low, lower = np.percentile(gaps, [5, 25]).tolist()
+    gap = low if low > _ABOVE else lower if lower < -_BELOW else 0.0
+    if gap:
         where = f"{abs(gap):.1f} m {'above' if gap > 0 else 'below'}"
         place.log.note(
             f"warning: the lower points lie {where} {file}: if these are not the same heights (ellipsoid and sea "

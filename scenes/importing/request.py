@@ -33,8 +33,8 @@ class ImportRequest:
     nir : path or sequence of path
         Near-infrared images of one band that show the place of `ortho`: its band ``nir``.
     dem : path or sequence of path
-        Bare-earth elevation (GeoTIFF), its gaps interpolated. Without it, the DEM is derived: from points of classes 2
-        (ground) and 9 (water), else by a ground filter.
+        Bare-earth elevation (GeoTIFF); narrow gaps are interpolated, wide ones derived from the points. Without it, the
+        DEM is derived: from points of classes 2 (ground) and 9 (water), else by a ground filter.
     reference : path, optional
         Footprints in any vector format; transformed when in another CRS.
     area : path, optional

@@ -144,7 +144,7 @@ def _image(request: ImportRequest, place: Place, headers: _Headers, cloud: Point
 
 def _dem(request: ImportRequest, place: Place, headers: _Headers, cloud: PointCloud | None) -> Elevation | None:
     if headers.models:
-        return dem_of(place, headers.models, request.dem_cell, cloud)
+        return dem_of(place, headers.models, request.dem_cell, cloud, request.ground_filter)
     return None if cloud is None else dem_of_points(place, cloud, request.dem_cell, request.ground_filter)
 
 

@@ -58,6 +58,12 @@ def points_of_surface(place: Place, surfaces: Sequence[RasterHeader]) -> PointCl
     how = place.log.derived["points"] = f"taken from the cells of a surface model, one every {grid.gsd:g} m"
     taken = counted(len(cloud), "point was", "points were")
     place.log.note(f"{file_names(files)}: {taken} {how}; {1 - land.mean():.1%} of the cells have none")
+    scaled = any(header.scale != 1 or header.offset != 0 for header in surfaces)
+    if not scaled and np.array_equal(cloud.z, np.round(cloud.z)):
+        place.log.note(
+            f"warning: {file_names(files)} has whole numbers as heights, which were taken for metres: if they are "
+            "decimetres or centimetres, set the scale, for instance with gdal_edit.py -scale 0.01"
+        )
     if grid.gsd > _COARSE:
         place.log.note(f"warning: cells of {grid.gsd:g} m are too large to show the walls of houses")
     return cloud

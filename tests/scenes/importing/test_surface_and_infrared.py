@@ -47,6 +47,52 @@ def infrared(folder, values, name="nir.tif"):
     return folder / name
 
 
+def notes_of(folder, **files):
+    return " ".join(rb.import_scene(folder, rb.ImportRequest(**files)).facts["notes"])
+
+
+@pytest.mark.parametrize("dtype", ["int16", "float32"])
+def test_whole_numbers_as_heights_are_warned_of_unless_they_have_a_scale(tmp_path, dtype):
+    import rasterio
+
+    write_elevation(Elevation(heights(), GRID), tmp_path / "metres.tif", crs=CRS)
+    for name, scale in (("plain", 1.0), ("scaled", 0.1)):
+        with rasterio.open(tmp_path / "metres.tif") as source:
+            profile = {**source.profile, "dtype": dtype, "nodata": None, "predictor": 1}
+        with rasterio.open(tmp_path / f"{name}.tif", "w", **profile) as target:
+            target.write(np.round(10 * heights()).astype(dtype), 1)
+            target.scales = (scale,)
+    assert "plain.tif has whole numbers as heights" in notes_of(tmp_path / "a", dsm=tmp_path / "plain.tif")
+    assert "whole numbers" not in notes_of(tmp_path / "b", dsm=tmp_path / "scaled.tif")
+    assert "whole numbers" not in notes_of(tmp_path / "c", dsm=tmp_path / "metres.tif")
+
+
+@pytest.mark.parametrize(
+    ("offset", "where"), [(2.0, "2.0 m below"), (1.0, "1.0 m below"), (-2.0, "2.0 m above"), (0.3, "")]
+)
+def test_a_dem_some_metres_beside_the_surface_is_warned_of(surface, tmp_path, offset, where):
+    write_elevation(Elevation(heights(roof=0) + np.float32(offset), GRID), tmp_path / "dtm.tif", crs=CRS)
+    found = notes_of(tmp_path / "scene", dsm=surface, dem=tmp_path / "dtm.tif")
+    assert (f"warning: the lower points lie {where} dtm.tif" in found) if where else ("warning" not in found)
+
+
+def test_wide_gaps_of_a_dem_take_the_ground_of_the_points_and_narrow_ones_are_interpolated(surface, tmp_path):
+    ground = heights(roof=0)
+    # A bank rises in the half without a DEM.
+    bank = np.broadcast_to(np.clip((np.arange(200) - 130) / 15, 0, 4).astype(np.float32), GRID.shape)
+    write_elevation(Elevation(heights() + bank, GRID), tmp_path / "bank.tif", crs=CRS)
+    for name, gap in (("half", slice(100, None)), ("narrow", slice(100, 110))):
+        values = ground + bank
+        values[:, gap] = np.nan
+        write_elevation(Elevation(values, GRID), tmp_path / f"{name}.tif", crs=CRS)
+        scene = rb.import_scene(
+            tmp_path / name, rb.ImportRequest(dsm=tmp_path / "bank.tif", dem=tmp_path / f"{name}.tif")
+        )
+        assert np.percentile(np.abs(scene.dem.values - ground - bank), 95) < 0.3
+        how = "derived by a ground filter" if name == "half" else "interpolated"
+        assert f"of its cells had no height and were {how}" in scene.facts["derived"]["dem"]
+
+
 def test_each_cell_with_a_height_becomes_a_point(surface, tmp_path):
     scene = rb.import_scene(tmp_path / "scene", rb.ImportRequest(dsm=surface))
     assert len(scene.points) == GRID.rows * GRID.columns - 100
