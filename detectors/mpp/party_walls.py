@@ -44,14 +44,17 @@ from .wall_colours import Colours, colours_at
 __all__ = [
     "CERTAIN",
     "PROBABLE",
+    "Marks",
     "Profile",
     "Wall",
     "WallRule",
+    "colour_marks",
     "colour_strength",
     "most_walls",
     "party_walls",
     "profile_of",
     "raised_strength",
+    "roof_marks",
     "wall_strength",
 ]
 
@@ -136,10 +139,11 @@ class Profile(NamedTuple):
         The first corner, metres in the grid frame, and the directions along the row and across it, unit length.
     length : float
         Along the row, m.
-    roof : ndarray, shape (stations, lines)
-        Heights without what stands on the roofs, m, outermost lines included.
-    shares : ndarray, shape (2, stations, lines), or None
-        Shares of red and of blue.
+    stations : int
+        Along the row.
+    roof : tuple of Marks or None
+        Steps and valleys, without what stands on the roofs.
+    colours : Marks or None
     rise : ndarray, shape (stations, lines), or None
         See `raised_walls`.
     chimneys : ndarray or None
@@ -150,8 +154,9 @@ class Profile(NamedTuple):
     along: Floats
     across: Floats
     length: float
-    roof: Floats
-    shares: Floats | None
+    stations: int
+    roof: tuple[Marks, Marks] | None
+    colours: Marks | None
     rise: Floats | None
     chimneys: Floats | None
 
@@ -197,14 +202,15 @@ def profile_of(
     flat = row * state.shape[1] + column
     high = state.take(flat) == HIGH
     roof = np.where(high, height.take(flat) / 100.0, np.nan)
-    shares = rise = stacks = None
+    inner = np.s_[..., 1:-1]
+    edges = rise = stacks = None
     around = colours() if depth <= _DEEPEST else None
     if around is not None:
-        shares = np.where(high, colours_at(around, row, column), np.nan)
+        edges = colour_marks(np.where(high, colours_at(around, row, column), np.nan)[inner])
     if depth <= _DEEPEST and structures is not None:
         rise = rises(roof + structures.take(flat) / 100.0)
         stacks = chimneys(rise) if _is_pitched(roof) else None
-    return Profile(place[0], u, v, length, roof, shares, rise, stacks)
+    return Profile(place[0], u, v, length, len(stations), roof_marks(roof[inner]), edges, rise, stacks)
 
 
 def _is_pitched(roof: Floats) -> bool:
@@ -218,10 +224,9 @@ def party_walls(profile: Profile | None, rule: WallRule, grid: Grid) -> list[Wal
     """Return the party walls across the longer side of a rectangle, in order; none where houses would be wide."""
     if profile is None:
         return []
-    inner = np.s_[..., 1:-1]
-    strength = wall_strength(profile.roof[inner], rule)
-    if profile.shares is not None:
-        strength += colour_strength(profile.shares[inner], rule)
+    strength = np.zeros(profile.stations) if profile.roof is None else wall_strength(profile.roof, rule)
+    if profile.colours is not None:
+        strength += colour_strength(profile.colours, rule)
     if profile.rise is not None:
         strength += raised_strength(profile.rise, profile.chimneys, rule)
     found: list[float] = []
@@ -242,22 +247,45 @@ def _cell_of(place: Floats) -> NDArray[np.int64]:
     return parts >> _FRACTION_BITS
 
 
-def wall_strength(profile: Floats, rule: WallRule) -> Floats:
-    """Return the evidence for a wall before each station of a profile, m, shape (stations,); 0 where there is none."""
+class Marks(NamedTuple):
+    """A step, a valley or an edge of colour before each station, as far as it does not depend on a rule.
+
+    Attributes
+    ----------
+    values : ndarray, shape (stations, lines)
+        Its size in each line, in the direction of the median; NaN is unknown.
+    size : ndarray, shape (stations,)
+        Of the median.
+    known : ndarray of int64, shape (stations,)
+        Number of lines where it is known.
+    """
+
+    values: Floats
+    size: Floats
+    known: NDArray[np.int64]
+
+    def strength(self, least: float, share: float, noise: float, known: float) -> Floats:
+        """Return the size where it counts, shape (stations,), else 0.
+
+        A mark counts that is known in a share of the lines, has a least size, and exceeds the noise in another share of
+        the lines where it is known.
+        """
+        seen = (self.known / max(self.values.shape[1], 1) >= known) & (self.size >= least)
+        seen[seen] = (self.values[seen] > noise).sum(axis=1) / self.known[seen] >= share
+        return np.where(seen, self.size, 0.0)
+
+
+def roof_marks(profile: Floats) -> tuple[Marks, Marks] | None:
+    """Return the steps and the valleys of heights, shape (stations, lines); None where they are too few."""
     count = len(profile)
-    strength = np.zeros(count)
     if count < 2 * (_REACH + _SHOULDER):
-        return strength
+        return None
     means = station_means(profile, _REACH)  # of stations i to i + _REACH - 1
     before, behind = np.full_like(profile, np.nan), np.full_like(profile, np.nan)
     before[_REACH:], behind[: len(means)] = means[: count - _REACH], means
     step = behind - before - _slope(before, behind)
-    known = np.isfinite(step)
     middle = line_medians(step)
-    stepped = (known.mean(axis=1) >= _KNOWN_STEP) & (np.abs(middle) >= rule.step)
-    agree = step[stepped] * np.sign(middle[stepped])[:, None] > _STEP_NOISE
-    stepped[stepped] = agree.sum(axis=1) / known[stepped].sum(axis=1) >= rule.step_share
-    strength[stepped] += np.abs(middle[stepped])
+    steps = Marks(step * np.sign(middle)[:, None], np.abs(middle), np.isfinite(step).sum(axis=1))
 
     low = np.full_like(profile, np.nan)
     low[1:] = np.fmin(profile[1:], profile[:-1])
@@ -266,12 +294,35 @@ def wall_strength(profile: Floats, rule: WallRule) -> Floats:
     left[far:] = means[: count - far]
     right[: len(means) - _SHOULDER] = means[_SHOULDER:]
     valley = (left + right) / 2 - low
-    known = np.isfinite(valley)
-    middle = line_medians(valley)
-    sunk = (known.mean(axis=1) >= _KNOWN_VALLEY) & (middle >= rule.valley)
-    sunk[sunk] = (valley[sunk] > _VALLEY_NOISE).sum(axis=1) / known[sunk].sum(axis=1) >= rule.valley_share
-    strength[sunk] += middle[sunk]
-    return strength
+    return steps, Marks(valley, line_medians(valley), np.isfinite(valley).sum(axis=1))
+
+
+def colour_marks(shares: Floats) -> Marks | None:
+    """Return the edges of colour in shares of red and blue, shape (2, stations, lines); None where there are none."""
+    _, count, lines = shares.shape
+    if count < 2 * _COLOUR_REACH or not np.isfinite(shares).any():
+        return None
+    edges = np.full((2, count, lines), np.nan)
+    for edge, share in zip(edges, shares, strict=True):
+        means = station_means(share, _COLOUR_REACH)
+        edge[_COLOUR_REACH : 1 - _COLOUR_REACH] = means[_COLOUR_REACH:] - means[:-_COLOUR_REACH]
+    middle = np.stack([line_medians(edge) for edge in edges])
+    size = np.hypot(*middle)
+    along = (edges * middle[:, :, None]).sum(axis=0) / np.maximum(size, 1e-12)[:, None]
+    return Marks(along, size, np.isfinite(along).sum(axis=1))
+
+
+def wall_strength(marks: tuple[Marks, Marks], rule: WallRule) -> Floats:
+    """Return the evidence of steps and valleys for a wall before each station, m, shape (stations,)."""
+    steps, valleys = marks
+    strength = steps.strength(rule.step, rule.step_share, _STEP_NOISE, _KNOWN_STEP)
+    return strength + valleys.strength(rule.valley, rule.valley_share, _VALLEY_NOISE, _KNOWN_VALLEY)
+
+
+def colour_strength(marks: Marks, rule: WallRule) -> Floats:
+    """Return the evidence of colours for a wall before each station, in metres of a step, shape (stations,)."""
+    noise = _COLOUR_NOISE * rule.colour
+    return _COLOUR_METRES * marks.strength(rule.colour, rule.colour_share, noise, _KNOWN_COLOUR)
 
 
 def _slope(before: Floats, behind: Floats) -> Floats:
@@ -299,32 +350,4 @@ def raised_strength(rise: Floats, stacks: Floats | None, rule: WallRule) -> Floa
         return repeated(strength)
     for station in stacks if rule.single else series(stacks):
         strength[round(float(station))] += _CHIMNEY_METRES
-    return strength
-
-
-def colour_strength(shares: Floats, rule: WallRule) -> Floats:
-    """Return the evidence of colours for a wall before each station, shape (stations,); 0 where there is none.
-
-    Parameters
-    ----------
-    shares : ndarray, shape (2, stations, lines)
-        Shares of red and of blue; NaN where they are not known.
-    rule : WallRule
-    """
-    _, count, lines = shares.shape
-    strength = np.zeros(count)
-    if count < 2 * _COLOUR_REACH or not np.isfinite(shares).any():
-        return strength
-    edges = np.full((2, count, lines), np.nan)
-    for edge, share in zip(edges, shares, strict=True):
-        means = station_means(share, _COLOUR_REACH)
-        edge[_COLOUR_REACH : 1 - _COLOUR_REACH] = means[_COLOUR_REACH:] - means[:-_COLOUR_REACH]
-    middle = np.stack([line_medians(edge) for edge in edges])
-    size = np.hypot(*middle)
-    known = np.isfinite(edges).all(axis=0)
-    seen = (known.mean(axis=1) >= _KNOWN_COLOUR) & (size >= rule.colour)
-    along = (edges[:, seen] * middle[:, seen, None]).sum(axis=0) / size[seen, None]
-    agree = (along > _COLOUR_NOISE * rule.colour).sum(axis=1)
-    seen[seen] = agree / known[seen].sum(axis=1) >= rule.colour_share
-    strength[seen] = _COLOUR_METRES * size[seen]
     return strength

@@ -13,10 +13,12 @@ from roofbench.detectors.mpp.cells import HIGH, LOW
 from roofbench.detectors.mpp.party_walls import (
     CERTAIN,
     PROBABLE,
+    colour_marks,
     colour_strength,
     most_walls,
     party_walls,
     profile_of,
+    roof_marks,
     wall_strength,
 )
 from roofbench.detectors.mpp.profiles import line_medians
@@ -135,8 +137,8 @@ def u(x, y):
 def test_a_slope_along_the_row_is_no_step():
     stations = np.arange(40)[:, None] * np.ones((1, 12))
     slope = 6 + 0.1 * stations
-    assert wall_strength(slope, PROBABLE).max() < 1e-9
-    stepped = wall_strength(slope + np.where(stations < 20, 0, 0.5), PROBABLE)
+    assert wall_strength(roof_marks(slope), PROBABLE).max() < 1e-9
+    stepped = wall_strength(roof_marks(slope + np.where(stations < 20, 0, 0.5)), PROBABLE)
     assert stepped.argmax() == 20
     assert stepped[20] >= 0.5
 
@@ -191,7 +193,9 @@ def test_the_strength_of_walls_is_that_of_plain_loops(seed, stations, lines, rul
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         expected = slow_strength(profile, rule)
-    np.testing.assert_allclose(wall_strength(profile, rule), expected, atol=1e-9)
+    marks = roof_marks(profile)
+    found = np.zeros(stations) if marks is None else wall_strength(marks, rule)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def slow_colours(shares, rule):
@@ -218,7 +222,9 @@ def test_the_strength_of_colour_edges_is_that_of_plain_loops(seed, stations, lin
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         expected = slow_colours(shares, rule)
-    np.testing.assert_allclose(colour_strength(shares, rule), expected, atol=1e-9)
+    marks = colour_marks(shares)
+    found = np.zeros(stations) if marks is None else colour_strength(marks, rule)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def levels(roofs, rectangles):
