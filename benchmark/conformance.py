@@ -6,8 +6,11 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -23,8 +26,9 @@ from ..scenes.geodata.footprints import Footprints
 from ..scenes.scene import NEUTRAL_NAME, Scene
 from .execution.isolation import IsolatedProcess
 from .execution.tasks import Task
-from .execution.worker import detect
+from .execution.worker import detect, execute
 from .identity.recipes import PluginRecipe, SceneRecipe
+from .identity.spool import spool
 from .store.outcomes import Outcome
 
 __all__ = ["Check", "check_detector", "check_evaluator", "check_plugin"]
@@ -66,6 +70,7 @@ def check_detector(detector: Detector) -> list[Check]:
         _check("leaves the scene as it was", lambda: "" if _digest(scene) == before else "it changed the arrays"),
         _check("does not use the name of the scene", lambda: _ignores_names(detector, scene)),
         _check(_SEARCH, lambda: _ignores_process(elsewhere, detector, scene)),
+        _check("opens and generates no scene with a reference", lambda: _makes_no_scene(detector, scene)),
         _check("a scene without buildings raises no error", lambda: _found(detector, _meadow(scene))),
         _check(_ELSEWHERE, lambda: _as_here(elsewhere, detector, scene)),
     ]
@@ -155,7 +160,7 @@ def _ignores_names(detector: Detector, scene: Scene) -> str:
 
 
 def _ignores_process(outcome: Outcome, detector: Detector, scene: Scene) -> str:
-    """Try the attack: detect where the callers hold a reference, which is wrong, and where no process holds one."""
+    """Try the attack: detect in a process that holds a reference, which is wrong, and in one that never held one."""
     if outcome.status != "ok":
         return ""  # reported by the rule of the other process
     reference = scene.reference
@@ -166,13 +171,44 @@ def _ignores_process(outcome: Outcome, detector: Detector, scene: Scene) -> str:
             scene.name, scene.extent, crs=scene.crs, points=scene.points, image=scene.image, dem=scene.dem,
             reference=bait,
         )  # fmt: skip
-        if shapely.to_wkb(detect(held, detector).polygons).tolist() != list(outcome.detections):
+        with tempfile.TemporaryDirectory(prefix="roofbench-") as folder:
+            spooled = SceneRecipe.of_scene(held, spooled=spool(held, Path(folder)))
+            # As a run with jobs=0 does it: frames and the opened scenes of the worker hold the reference.
+            task = Task(scene=spooled, detector=PluginRecipe.of(detector), seed=0, evaluators=())
+            found = execute(task, detector=detector)
+        if found.status != "ok":
+            return found.reason
+        if found.detections != outcome.detections:
             return (
-                "it finds other footprints where the frames of its callers hold a reference than in a process that "
-                "never held one. A detector that runs in this process (rb.detect, jobs=0) can reach all its memory; "
-                "trust results of isolated runs only (jobs=1 or more)"
+                "it finds other footprints where its process holds a reference than in a process that never held one. "
+                "A detector that runs in this process (rb.detect, jobs=0) can reach all its memory; trust results of "
+                "isolated runs only (jobs=1 or more)"
             )
     return ""
+
+
+def _makes_no_scene(detector: Detector, scene: Scene) -> str:
+    """Try the detector where each new scene with a reference is noted: the generator and real scenes are at hand."""
+    made: list[str] = []
+    original = Scene.__init__
+
+    def noting(self: Scene, name: str, *more: Any, **layers: Any) -> None:
+        if layers.get("reference") is not None:
+            made.append(name)
+        original(self, name, *more, **layers)
+
+    seen = scene.for_detection()
+    setattr(Scene, "__init__", noting)  # noqa: B010 - a plain assignment is an error for mypy
+    try:
+        detector.detect(seen, random_stream(0, scene.name, detector.name))
+    finally:
+        setattr(Scene, "__init__", original)  # noqa: B010
+    if not made:
+        return ""
+    return (
+        f"while it detects, it makes the scene {made[0]!r}, which has a reference: a generator, or the folder of a "
+        "real scene, gives the truth of the same measurements"
+    )
 
 
 def _wkb_under(name: str, detector: Detector, scene: Scene) -> list[bytes]:

@@ -161,3 +161,16 @@ def test_a_spying_plugin_is_reported_by_its_check():
     broken = {check.rule: check.problem for check in check_detector(make_detector(SPY)) if not check.passed}
     assert "does not search its process for the reference" in broken
     assert "runs in this process" in broken["does not search its process for the reference"]
+
+
+@pytest.mark.parametrize(
+    ("plugin", "rule"),
+    [
+        ("Generating", "opens and generates no scene with a reference"),
+        ("Remembering", "does not search its process for the reference"),
+    ],
+)
+def test_a_plugin_that_reaches_the_truth_without_a_name_is_reported(plugin, rule):
+    detector = make_detector(f"{PLUGINS / 'generating.py'}:{plugin}")
+    broken = {check.rule for check in check_detector(detector) if not check.passed}
+    assert rule in broken

@@ -182,7 +182,7 @@ def test_a_value_that_cannot_be_read_is_refused_by_the_name_of_its_option(cli, w
 
 
 def test_check_plugin_accepts_an_honest_detector_and_names_broken_rules(cli, misbehaving, tmp_path):
-    assert "12 of 12 rules followed" in cli("check-plugin", misbehaving).stdout
+    assert "13 of 13 rules followed" in cli("check-plugin", misbehaving).stdout
     (tmp_path / "bad.py").write_text(
         "from dataclasses import dataclass\nimport numpy as np\nimport roofbench as rb\n\n"
         "@dataclass(frozen=True, kw_only=True)\nclass Bad(rb.Detector):\n"
