@@ -60,8 +60,11 @@ def runs_beside(store: Store, contributed: Sequence[RunRow]) -> list[RunRow]:
     return [row for row in newest_runs(store) if row.scene_key in scenes and row.label not in labels]
 
 
-def contribution_problems(suite: Suite, folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield the name of each scene with what is wrong with its file (empty: nothing), then of each unknown file."""
+def contribution_problems(suite: Suite, folder: Path, whole: Suite | None = None) -> Iterator[tuple[str, str]]:
+    """Yield the name of each scene with what is wrong with its file (empty: nothing), then of each unknown file.
+
+    Files of further scenes of the `whole` suite are known, too.
+    """
     detector = Precomputed(folder=str(folder))
     for scene in suite.scenes:
         try:
@@ -73,5 +76,5 @@ def contribution_problems(suite: Suite, folder: Path) -> Iterator[tuple[str, str
             yield scene.name, str(error)
         else:
             yield scene.name, ""
-    for file, hint in unknown_files(folder, [scene.name for scene in suite.scenes]):
+    for file, hint in unknown_files(folder, [scene.name for scene in (whole or suite).scenes]):
         yield file.name, f"belongs to no scene of {suite.name!r}{hint}"

@@ -6,6 +6,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -89,14 +90,14 @@ def score(
         return
     if suite is None:
         raise ParameterError("footprints= needs a suite=: the scenes that the files belong to")
-    chosen = suite_of_words([suite], evaluators=evaluator)
-    if scenes is not None:
-        chosen = chosen.with_scenes(scenes)
+    whole = suite_of_words([suite], evaluators=evaluator)
+    chosen = whole if scenes is None else whole.with_scenes(scenes)
     if check:
-        _check(chosen, footprints)
+        _check(chosen, footprints, whole)
         return
     with Store(store) as opened:
         others, own = _contributed(opened, chosen, footprints, label)
+        others = [row for row in others if detectors is None or fnmatchcase(row.label, detectors)]
         rows, failed = [*others, *own], [row for row in own if row.status == "failed"]
         evaluators = tuple(KeyedEvaluator.of(one) for one in chosen.evaluators)
         show = _Shown(form, index, wide, all_versions)
@@ -119,11 +120,14 @@ def _contributed(store: Store, suite: Suite, folder: Path, label: str) -> tuple[
     return runs_beside(store, result.rows), list(result.rows)
 
 
-def _check(suite: Suite, folder: Path) -> None:
-    """Print what is missing, and leave with exit code 2 where something is."""
+def _check(suite: Suite, folder: Path, whole: Suite) -> None:
+    """Print what is missing, and leave with exit code 2 where something is.
+
+    `suite` has the chosen scenes of the `whole` one, to which all files may belong.
+    """
     from ..benchmark.contribution import contribution_problems
 
-    problems = dict(contribution_problems(suite, folder))
+    problems = dict(contribution_problems(suite, folder, whole))
     for name, problem in problems.items():
         print_result(f"{name}: {problem or 'ok'}")
     wrong = sum(map(bool, problems.values()))

@@ -169,6 +169,16 @@ def test_check_and_score_refuse_the_same_files(place):
     roofbench("score", "--footprints", "mine", "--suite", "my.toml", folder=place, expect=3)
 
 
+def test_a_choice_of_scenes_and_detectors_is_no_problem_for_the_others(place):
+    only = ("--footprints", "mine", "--suite", "my.toml", "--scenes", "hamlet-1")
+    checked = roofbench("score", *only, "--check", folder=place)
+    assert checked.stdout.splitlines() == ["hamlet-1: ok", "1 scene, 0 problems"]
+    for detectors, shown in (("mpp*", {"precomputed:mine"}), ("nd*", {"precomputed:mine", "ndsm"})):
+        roofbench("run", "my.toml", "--scenes", "hamlet-1", "-q", "-j", "0", folder=place)
+        board = rows(roofbench("score", *only, "--detectors", detectors, "-f", "json", folder=place))
+        assert set(board) == shown
+
+
 def test_footprints_of_a_scene_in_tiles_are_read_whole(place):
     (place / "my.toml").write_text('[[scenes]]\npath = "village"\ntile = 64\n')
     answer = roofbench("score", "--footprints", "mine", "--suite", "my.toml", "-f", "json", folder=place)
