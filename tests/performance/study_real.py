@@ -47,6 +47,7 @@ THRESHOLDS = {
     "step between a roof and its rim, cm": (block_cells, "_RIM_STEP", -100_000, (-100_000, 30, 50, 100)),
     "width of gaps, m": (block_cells, "_NARROW", 0.01, (0.01, 3.0, 4.0, 5.0, 6.0)),
     "radius of the opening, m": (block_cells, "_OPENING", None, (0.5, 1.0, 1.5)),
+    "probable walls of one part that are certain": (rows, "_MANY", 1000, (4, 5, 6, 7, 1000)),
     "shortest row, m": (rows, "_SHORTEST", 0.0, (0.0, 20.0, 22.5, 25.0, 30.0)),
     "certain party walls of a row": (rows, "_CERTAIN_WALLS", 1000, (2, 3, 4, 1000)),
     "certain party walls of a long row": (rows, "_WALLS_OF_LONG", 1000, (2, 3, 1000)),
