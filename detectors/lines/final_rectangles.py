@@ -121,10 +121,15 @@ def black_shares(
 
 
 @kernel
-def colour_share(colours: Colours, within: NDArray[np.bool_], strip: NDArray[np.float64]) -> float:
-    """Return the least share of a strip in range over Y, I and Q."""
+def has_colours(colours: Colours, within: NDArray[np.bool_], strip: NDArray[np.float64], colour_share: float) -> bool:
+    """Return whether more than a share of a strip is in range in each of Y, I and Q."""
     rows, columns = colours.values.shape[1:]
     across, down = max(1, round(strip[U1] - strip[U0])), max(1, round(strip[V1] - strip[V0]))
+    cells = across * down
+    # The least number that is a larger share than asked, whatever the rounding: it is often known after a few rows.
+    least = math.floor(colour_share * cells)
+    while np.divide(least, cells) <= colour_share:
+        least += 1
     of_y, of_i, of_q = 0, 0, 0
     for i in range(across):
         u = strip[U0] + np.divide((i + 0.5) * (strip[U1] - strip[U0]), across)  # without a test for zero
@@ -138,7 +143,10 @@ def colour_share(colours: Colours, within: NDArray[np.bool_], strip: NDArray[np.
             of_y += within[0, np.uintp(y_bin)]
             of_i += within[1, np.uintp(i_bin)]
             of_q += within[2, np.uintp(q_bin)]
-    return float(min(of_y, of_i, of_q) / (across * down))
+        fewest = min(of_y, of_i, of_q)
+        if fewest >= least or fewest + (across - i - 1) * down < least:
+            return bool(fewest >= least)
+    return False
 
 
 @kernel
@@ -165,7 +173,7 @@ def extended_final_side(
         if rises and gap:
             break
         solid = filled > rules.black_share and (rules.rises_after_gap or not rises)
-        if solid and colour_share(colours, within, strip) > rules.colour_share:
+        if solid and has_colours(colours, within, strip, rules.colour_share):
             reached, before = end, black
         else:
             width /= 2

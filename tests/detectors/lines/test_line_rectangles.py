@@ -1,5 +1,6 @@
 """Adjustment, extension, rectangles and dominant colours."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,8 +15,8 @@ from roofbench.detectors.lines.extension import Cover, Growth, extend_lines, ext
 from roofbench.detectors.lines.final_rectangles import (
     FinalRules,
     black_shares,
-    colour_share,
     extended_final_side,
+    has_colours,
     lies_inside,
     shrink,
 )
@@ -328,7 +329,8 @@ def test_shares_of_an_axis_parallel_strip_are_those_of_its_pixels():
     strip = np.array([50.0, 20.0, 0.0, 1.0, 0.0, 20.0, -20.0, 10.0])
     within = dominant_ranges(colours, np.array([30.0, 30.0, 1.0, 0.0, -9.0, 9.0, -9.0, 9.0]), 0.97, 0.9)
     assert black_shares(black, 1 - black, strip) == pytest.approx((0.5, 0.5))
-    assert colour_share(colours, within, strip) == pytest.approx(20 / 30)
+    assert has_colours(colours, within, strip, 0.66)
+    assert not has_colours(colours, within, strip, 0.67)
 
 
 def test_a_strip_thinner_than_a_pixel_is_sampled_once_across():
@@ -336,7 +338,28 @@ def test_a_strip_thinner_than_a_pixel_is_sampled_once_across():
     strip = np.array([30.0, 20.5, 1.0, 0.0, 0.0, 10.0, 0.0, 0.3])
     within = np.ones((3, 20), dtype=bool)
     assert black_shares(black, black, strip) == (1, 1)
-    assert colour_share(colours, within, strip) == 1
+    assert has_colours(colours, within, strip, 0.99)
+    assert not has_colours(colours, within, strip, 1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_colours_of_a_strip_are_those_of_its_lattice(seed):
+    rng = np.random.default_rng(seed)
+    colours = Colours.of(rng.integers(0, 255, (3, 30, 40), dtype=np.uint8))
+    within = rng.random((3, 20)) < 0.7
+    angle = rng.uniform(0, 7)
+    # Partly beyond the image, so that not all of it has a colour.
+    strip = np.array([30.0, 15.0, np.cos(angle), np.sin(angle), -12.0, 12.0, -2.0, 1.5])
+    lattice = [(u, v) for u in np.arange(-11.5, 12) for v in -2 + 3.5 / 4 * np.arange(0.5, 4)]
+    counts = np.zeros(3)
+    for u, v in lattice:
+        column = math.floor(strip[0] + u * strip[2] - v * strip[3])
+        row = math.floor(strip[1] + u * strip[3] + v * strip[2])
+        if 0 <= row < 30 and 0 <= column < 40:
+            counts += [within[band, k] for band, k in enumerate(yiq_bins(colours, row, column))]
+    share = counts.min() / len(lattice)
+    found = [has_colours(colours, within, strip, asked) for asked in (0.0, np.nextafter(share, 0), share, 1.0)]
+    assert found == [True, True, False, False]
 
 
 def test_directions_are_unit_vectors_after_all_steps():
