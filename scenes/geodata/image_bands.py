@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.errors import InputError
+from .infrared_values import unlike_infrared
 from .opened_rasters import opened
 from .raster_headers import RasterHeader
 
@@ -18,6 +19,7 @@ __all__ = [
     "band_names",
     "looks_like_values",
     "require_image_type",
+    "require_infrared",
     "sampled_largest",
 ]
 
@@ -36,7 +38,8 @@ _WORDS = {
 _LETTERS = {"r": "red", "g": "green", "b": "blue", "n": "nir", "i": "nir"}
 #: Words of bands between and beyond the colours.
 _SHADES = {"edge", "rededge", "swir", "shortwave", "thermal", "tir", "lwir", "coastal", "yellow"}
-#: A description that only counts.
+#: Descriptions that say nothing, and those that only count.
+_UNNAMED = {"undefined", "unknown", "other", "extra"}
 _NUMBER = re.compile(r"(band|layer|channel|b)?[ _-]*\d+")
 
 
@@ -78,7 +81,21 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
                 f"{header.path} says that its band {wrong[0] + 1} is {found[wrong[0]]}, and does not name all others: "
                 f"name them by bands=, such as {','.join(names)}, - to skip one"
             )
+    if "nir" in names and _says_other(header.band_names):
+        raise InputError(
+            f"{header.path} says that its band 4 is {header.band_names[3]!r}, which is not near infrared: name the "
+            "bands by bands=, such as red,green,blue,-"
+        )
     return names
+
+
+def _says_other(texts: Sequence[str]) -> bool:
+    """Return whether the last description names something; those that differ by a number alone only count."""
+    text = texts[-1].strip()
+    if not text or text in _UNNAMED or _NUMBER.fullmatch(text) or _described(text):
+        return False
+    stems = {re.sub(r"\d+$", "", other.strip()) for other in texts}
+    return len(stems) > 1 or not text[-1].isdecimal()
 
 
 def _names_by_colour(colours: Sequence[str]) -> tuple[str, ...] | None:
@@ -149,6 +166,27 @@ def looks_like_values(header: RasterHeader) -> bool:
     limits = (0, 1, np.iinfo(values.dtype).max) if values.dtype.kind == "u" else (0, 1, 255)
     # Soft edges of a mosaic have some values between, and few pixels.
     return len(np.unique(values)) > 8 or float(np.isin(values, limits, invert=True).mean()) > 0.1
+
+
+def require_infrared(header: RasterHeader, bands: Sequence[str] | None) -> None:
+    """Raise `InputError` where a band that is assumed to be near infrared has values that are not, of a sample."""
+    names = band_names(header, bands)
+    if "nir" not in names or assumed_bands(header, bands) is None:
+        return
+    indexes = [index for index, name in enumerate(names, start=1) if name != "-"]
+    with opened(header.path, alpha=alpha_of(header, names)) as source:
+        shape = tuple(min(side, 512) for side in source.shape)
+        values = source.read(indexes, out_shape=(len(indexes), *shape), masked=True)
+    known = ~np.ma.getmaskarray(values).any(axis=0)
+    by_name = {name: values.data[row][known] for row, name in enumerate(name for name in names if name != "-")}
+    infrared = by_name.pop("nir")
+    reason = unlike_infrared(infrared, by_name) if known.any() else None
+    if reason:
+        skipped = ",".join("-" if name == "nir" else name for name in names)
+        raise InputError(
+            f"{header.path} does not name band {names.index('nir') + 1}, which {reason}, so it is not taken for near "
+            f"infrared: name the bands by bands=, such as {skipped}"
+        )
 
 
 def sampled_largest(header: RasterHeader, names: Sequence[str]) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...core.errors import InputError
-from ..geodata.image_bands import assumed_bands, looks_like_values
+from ..geodata.image_bands import assumed_bands, looks_like_values, require_infrared
 from ..geodata.points import PointCloud
 from ..geodata.raster import Image
 from ..geodata.raster_headers import RasterHeader
@@ -34,6 +34,7 @@ def image_of(
     check_size(place, grid.gsd, "gsd")
     note_resampling(place, images, grid)
     for header in images:
+        require_infrared(header, bands)
         sentence = assumed_bands(header, bands)
         if sentence:
             place.log.note(sentence)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.errors import InputError
+from ..geodata.infrared_values import unlike_infrared
 from ..geodata.raster import Image
 from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_image
@@ -14,11 +15,6 @@ from .place import Place, extent_text, file_names, file_paths
 from .raster_layer import note_resampling
 
 __all__ = ["with_infrared"]
-
-#: A band with fewer values is a mask.
-_FEWEST_VALUES = 8
-#: Share of the pixels that may equal those of another band.
-_MOST_EQUAL = 0.99
 
 
 def with_infrared(
@@ -59,13 +55,10 @@ def with_infrared(
     both = valid if band.valid is None else valid & band.valid
     if not both.any():
         raise InputError(f"{named} has no data where the orthoimage has, {extent_text(place.extent)}: check its CRS")
-    values = band.values[0][both]
-    levels = len(np.unique(values))
-    if levels < _FEWEST_VALUES:
-        raise InputError(f"{named} holds {levels} values only, as a mask does: give near infrared of many levels")
-    for name, other in zip(image.bands, image.values, strict=True):
-        if (other[both] == values).mean() > _MOST_EQUAL:
-            raise InputError(f"{named} equals the {name} band of the orthoimage: give near infrared")
+    colours = {name: other[both] for name, other in zip(image.bands, image.values, strict=True)}
+    reason = unlike_infrared(band.values[0][both], colours)
+    if reason:
+        raise InputError(f"{named} {reason}: give near infrared")
     if both.sum() < valid.sum():
         place.log.note(
             f"{file_names(files)} covers {both.sum() / valid.sum():.1%} of the orthoimage; the rest is left out"

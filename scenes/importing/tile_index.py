@@ -21,7 +21,7 @@ from ...core.wording import counted
 from ..folder import FILES, MANIFEST, open_scene, read_manifest, write_manifest
 from ..geodata.colour_depth import common_depths, depth_note
 from ..geodata.crs import crs_label, named_crs, require_metric, same_crs
-from ..geodata.image_bands import band_names, sampled_largest
+from ..geodata.image_bands import band_names, require_infrared, sampled_largest
 from ..geodata.las_files import read_chunks, read_las_header
 from ..geodata.point_chunks import read_chunk_index, write_chunk_index
 from ..geodata.raster import Grid
@@ -166,6 +166,7 @@ def _tile(home: Path, file: Path, crs: str | None) -> _Tile:
     entry["bounds"], entry["gsd"] = list(raster.grid.extent), raster.grid.gsd
     if entry["layer"] == "image":
         entry["bands"] = list(band_names(raster, None))
+        require_infrared(raster, None)
     else:
         _require_heights(raster)
     entry["sha256"] = checksum(file)

@@ -9,7 +9,7 @@ from rasterio.enums import ColorInterp
 from rasterio.warp import transform as transform_points
 
 from roofbench.core.errors import CRSError, InputError
-from roofbench.scenes.geodata.image_bands import assumed_bands, band_names
+from roofbench.scenes.geodata.image_bands import assumed_bands, band_names, require_infrared
 from roofbench.scenes.geodata.raster import Grid
 from roofbench.scenes.geodata.raster_files import read_image
 from roofbench.scenes.geodata.raster_headers import read_raster_header
@@ -227,12 +227,50 @@ def test_descriptions_name_the_bands_in_other_words(tmp_path, texts, names):
     assert assumed_bands(header, None) is None
 
 
-def test_descriptions_that_name_no_colour_are_noted(tmp_path):
+@pytest.mark.parametrize(
+    "texts", [("red", "green", "blue", "b4"), ("a_1", "a_2", "a_3", "a_4"), ("", "", "", "Band 4")]
+)
+def test_descriptions_that_say_nothing_of_the_fourth_band_leave_it_infrared(tmp_path, texts):
     with rasterio.open(raster(tmp_path / "a.tif", levels=(200, 100, 50, 30)).path, "r+") as target:
-        target.descriptions = ("red", "green", "blue", "red edge")
-    note = assumed_bands(read_raster_header(tmp_path / "a.tif"), None)
-    assert note is not None
-    assert "'red edge'" in note
+        target.descriptions = texts
+    header = read_raster_header(tmp_path / "a.tif")
+    assert band_names(header, None) == ("red", "green", "blue", "nir")
+    assert "nir" in assumed_bands(header, None)
+
+
+@pytest.mark.parametrize("text", ["red edge", "valid", "Deckung", "nDSM", "thermal"])
+def test_a_fourth_band_that_is_described_as_something_else_is_not_taken_for_infrared(tmp_path, text):
+    with rasterio.open(raster(tmp_path / "a.tif", levels=(200, 100, 50, 30)).path, "r+") as target:
+        target.descriptions = ("red", "green", "blue", text)
+    header = read_raster_header(tmp_path / "a.tif")
+    with pytest.raises(InputError, match=f"band 4 is '{text.lower()}', which is not near infrared"):
+        band_names(header, None)
+    named = ("red", "green", "blue", "-")
+    assert read_image(header.path, bands=named).bands == named[:3]
+
+
+def test_values_of_masks_counts_and_other_bands_are_not_taken_for_infrared(tmp_path):
+    rng = np.random.default_rng(0)
+    colours = rng.integers(20, 200, (3, 80, 80), dtype=np.uint8)
+    soft = np.full((80, 80), 255, dtype=np.uint8)
+    soft[:30] = np.linspace(0, 255, 30).astype(np.uint8)[:, None]
+    odd = {
+        "6 values only": rng.integers(1, 7, (80, 80)),
+        "1 value only": np.zeros((80, 80)),
+        "is 0 or 255 in 6": soft,
+        "equals the green band": colours[1],
+        "is a sum of red, green, blue": colours.mean(axis=0),
+    }
+    for reason, band in odd.items():
+        header = raster(tmp_path / "a.tif", colours=("gray", "undefined", "undefined", "undefined"))
+        with rasterio.open(header.path, "r+") as target:
+            target.write(np.concatenate([colours, band[None].astype(np.uint8)]))
+        with pytest.raises(InputError, match=f"band 4, which .*{reason}.*such as red,green,blue,-"):
+            require_infrared(read_raster_header(header.path), None)
+        require_infrared(read_raster_header(header.path), ("red", "green", "blue", "nir"))
+    with rasterio.open(header.path, "r+") as target:
+        target.write(rng.integers(0, 255, (80, 80), dtype=np.uint8), 4)
+    require_infrared(read_raster_header(header.path), None)
 
 
 @pytest.mark.parametrize(
