@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +74,8 @@ READINGS = {
     ),
 }
 FACTORS = (0.5, 2.0)
+#: Seeds of random thinnings.
+DRAWS = (5, 6, 7)
 NUMBERS = (
     "price", "fit_weight", "least_tau", "low_price", "void_price", "texture_weight", "texture_limit", "least_height",
     "least_side", "roof_price", "roof_step", "overlap", "ground_error", "slender",
@@ -205,18 +207,20 @@ def readings(_folders):
     for label, change in READINGS.items():
         values = []
         for scene in scenes:
-            detector = rb.make_detector(f"mpp-printed[iterations=200000,{change}]")
+            # A later value of a parameter replaces an earlier one.
+            given = dict(part.split("=") for part in f"iterations=200000,{change}".split(","))
+            detector = rb.make_detector(f"mpp-printed[{','.join(map('='.join, given.items()))}]")
             result = rb.evaluate(detector.detect(scene.for_detection(), np.random.default_rng(0)), scene.reference)
             values += [result.object.completeness, result.object.correctness, result.object.quality]
             values.append(result.pixel.quality)
         print(f"| {label} | " + " | ".join(f"{100 * (value or 0):.1f}" for value in values) + " |", flush=True)
 
 
-def thinned(density):
+def thinned(density, draw):
     def thin(cloud):
         places = np.floor(np.column_stack([cloud.x, cloud.y]) / 2)
         covered = 4.0 * len(np.unique(places, axis=0))
-        keep = np.random.default_rng(5).random(len(cloud)) < density * covered / len(cloud)
+        keep = np.random.default_rng(draw).random(len(cloud)) < density * covered / len(cloud)
         return cloud.take(keep)
 
     return thin
@@ -235,16 +239,21 @@ def last(cloud):
 
 
 def points(folders):
+    """Print quality by density and kind of returns; what is thinned at random is the mean of some draws."""
     chosen = cases(folders, presets=())
-    variants = {"all returns": None} | {f"{density} points per m2": thinned(density) for density in (15, 8, 3, 1.5)}
-    variants |= {"first returns": first, "last returns": last, "return numbers unknown": without_return_numbers}
-    variants |= {
-        "first returns, numbers unknown, 3 per m2": lambda cloud: thinned(3)(without_return_numbers(first(cloud))),
-        "last returns, numbers unknown, 3 per m2": lambda cloud: thinned(3)(without_return_numbers(last(cloud))),
-    }
+    whole = {"all returns": None, "first returns": first, "last returns": last}
+    whole["return numbers unknown"] = without_return_numbers
     head(chosen, "points (no DEM)")
-    for label, change in variants.items():
+    for label, change in whole.items():
         line(label, [case.quality(points=change, dem=False) for case in chosen])
+    random = {f"{density} points per m2": (density, lambda cloud: cloud) for density in (15, 8, 3, 1.5)}
+    for label, returns in (("first", first), ("last", last)):
+        change = partial(lambda returns, cloud: without_return_numbers(returns(cloud)), returns)
+        random[f"{label} returns, numbers unknown, 3 per m2"] = (3, change)
+    for label, (density, change) in random.items():
+        thin = [partial(lambda thin, change, cloud: thin(change(cloud)), thinned(density, k), change) for k in DRAWS]
+        values = [[case.quality(points=one, dem=False) for case in chosen] for one in thin]
+        line(label, np.mean(values, axis=0))
 
 
 def ground(folders):
