@@ -70,6 +70,9 @@ def _say(result: CityResult, output: Path, name: str) -> None:
     values = ", ".join(f"{key}={value:g}" for key, value in result.measured.parameters.items())
     if values:
         say(f"note: {name}: all tiles share {values}, measured on up to five of them")
+    if result.cues:
+        tiles = (f"{cues} ({counted(number, 'tile')})" for cues, number in result.cues.items())
+        say(f"cues used on {name}: {'; '.join(tiles)}")
     seams = result.seams
     if any(seams):
         say(

@@ -24,6 +24,7 @@ def format_run(store: Store, row: RunRow) -> str:
         f"  detector   {row.detector}  {json.dumps(row.parameters)}",
         f"  scene      {row.scene}, key {row.scene_key[:16]}",
         *(f"  note       {one_line(str(note))}" for note in store.run_notes([row.id]).get(row.id, ())),
+        *_cues(store, row),
         *_evaluations(store, row),
         f"  seed       {row.seed}",
         f"  code       roofbench {row.version}, {counted(len(code.modules), 'module')}, digest {code.digest[:16]}",
@@ -38,6 +39,12 @@ def format_run(store: Store, row: RunRow) -> str:
     if row.traceback:
         lines += ["", row.traceback.rstrip()]
     return "\n".join(lines)
+
+
+def _cues(store: Store, row: RunRow) -> list[str]:
+    """Return a line with the cues that the detector used, where it names them."""
+    used = store.metadata(row.id).get("cues")
+    return [f"  cues       {one_line(', '.join(map(str, used)))}"] if isinstance(used, list) and used else []
 
 
 def _evaluations(store: Store, row: RunRow) -> list[str]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -84,6 +84,8 @@ class CityResult(NamedTuple):
     measured : Measured
     peak_memory : int
         Highest resident memory of a worker, bytes; 0 where it is not known.
+    cues : mapping of str to int
+        Tiles by the cues that the detector used there, where it names them.
     """
 
     footprints: int
@@ -95,6 +97,7 @@ class CityResult(NamedTuple):
     left_out: tuple[str, ...]
     measured: Measured
     peak_memory: int
+    cues: Mapping[str, int]
 
 
 class _Job(NamedTuple):
@@ -181,6 +184,7 @@ def detect_city(
         left_out=left_out,
         measured=work.measured,
         peak_memory=survey.cost.peak_memory or 0,
+        cues=survey.cues,
     )
 
 

@@ -31,12 +31,15 @@ class TileSurvey(NamedTuple):
         Times of all tiles together, highest memory of one of them.
     notes : tuple of str
         Of all tiles, each once.
+    cues : mapping of str to int
+        Tiles by the cues that the detector used there, where it names them.
     """
 
     facts: TileFacts
     skipped: dict[Tile, str]
     cost: Cost
     notes: tuple[str, ...]
+    cues: Mapping[str, int]
 
 
 def tile_of_file(file: Path, side: float) -> Tile:
@@ -49,6 +52,7 @@ def survey_tiles(files: Mapping[Tile, Path]) -> TileSurvey:
     """Read the outcomes of finished tiles one by one, and keep none."""
     skipped: dict[Tile, str] = {}
     notes: dict[str, None] = {}
+    cues: dict[str, int] = {}
     seconds, cpu_seconds, peak = 0.0, 0.0, 0
 
     def parts() -> Iterator[tuple[Tile, Footprints]]:
@@ -60,10 +64,14 @@ def survey_tiles(files: Mapping[Tile, Path]) -> TileSurvey:
                 skipped[tile] = str(outcome.reason)
             elif outcome.status == "ok":
                 notes.update(dict.fromkeys(outcome.metadata.get("notes", ())))
+                used = ", ".join(map(str, outcome.metadata.get("cues", ())))
+                if used:
+                    cues[used] = cues.get(used, 0) + 1
                 yield tile, _footprints(outcome)
 
     facts = tile_facts(parts())
-    return TileSurvey(facts, skipped, Cost(seconds=seconds, cpu_seconds=cpu_seconds, peak_memory=peak), tuple(notes))
+    cost = Cost(seconds=seconds, cpu_seconds=cpu_seconds, peak_memory=peak)
+    return TileSurvey(facts, skipped, cost, tuple(notes), cues)
 
 
 def stored_parts(files: Mapping[Tile, Path]) -> Iterator[tuple[Tile, Footprints]]:

@@ -108,6 +108,8 @@ def test_why_says_what_a_run_depends_on(cli, misbehaving):
     assert "failures are tried again" in failed
     assert "Nothing that it depends on has changed: it would not be run again." in cli("why", 2).stdout
     assert "no run named '77'" in cli("why", 77, code=2)
+    cli("run", "hamlet", "-d", "ndsm", "-j", 0)
+    assert "  cues       multiple returns, roughness" in cli("why", 3).stdout
 
 
 def test_score_evaluates_stored_detections_again(cli, misbehaving):

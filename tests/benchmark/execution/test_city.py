@@ -252,6 +252,8 @@ def test_a_bad_file_costs_its_tiles_alone_and_a_repaired_one_is_computed_then(co
     code, _, message = run(*words, "--overwrite")
     assert code == 0, message
     assert "finished before" in message
+    assert "cues used on tiles: " in message
+    assert "roughness" in message
     assert output.read_bytes() == columns[1]
 
 
