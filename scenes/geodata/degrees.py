@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from ...core.errors import CRSError
+from .crs import parse_crs
 
 __all__ = ["JSON_ENDINGS", "JSON_SYSTEMS", "json_means_degrees", "refuse_degrees"]
 
@@ -50,7 +52,7 @@ def json_means_degrees(file: Path, geometries: NDArray[np.object_]) -> bool:
     Raises
     ------
     CRSError
-        Degrees with latitude first.
+        Degrees with latitude first, or a named CRS that is not known.
     """
     if file.suffix.lower() not in JSON_ENDINGS:
         return True
@@ -58,8 +60,11 @@ def json_means_degrees(file: Path, geometries: NDArray[np.object_]) -> bool:
     if not len(bounds):
         return False
     small = _are_degrees(bounds, sizes)
-    if not small and _says_no_crs(file):
-        return False
+    if not small:
+        member = _crs_member(file)
+        if member is None:
+            return False
+        _refuse_unknown(member, file)
     x, y = np.median(np.abs(bounds[:, [0, 1]]), axis=0)
     if x <= 90 < y <= 180:
         raise CRSError(
@@ -83,12 +88,25 @@ def _are_degrees(bounds: NDArray[np.float64], sizes: NDArray[np.float64]) -> boo
     return bool(len(bounds)) and 2 * int(np.count_nonzero(small)) >= len(bounds)
 
 
-def _says_no_crs(file: Path) -> bool:
-    """Return whether a GeoJSON file has the member ``"crs": null``, wherever it stands."""
+def _crs_member(file: Path) -> Any:
+    """Return the member ``crs`` of a GeoJSON file, wherever it stands; an empty one where there is none."""
     if file.stat().st_size > _LARGEST_JSON:
-        return False
+        return {}
     try:
         content = json.loads(file.read_bytes())
     except (ValueError, RecursionError):  # a feature per line, or what GDAL alone reads
-        return False
-    return isinstance(content, dict) and "crs" in content and content["crs"] is None
+        return {}
+    return content.get("crs", {}) if isinstance(content, dict) else {}
+
+
+def _refuse_unknown(member: Any, file: Path) -> None:
+    """Raise `CRSError` for a named CRS that is not known: GDAL takes such a file to be in degrees."""
+    properties = member.get("properties") if isinstance(member, dict) else None
+    name = properties.get("name") if isinstance(properties, dict) else None
+    if isinstance(name, str) and name:
+        try:
+            parse_crs(name)
+        except CRSError as error:
+            raise CRSError(
+                f"{file}: its CRS {name[:60]!r} is not known: name one such as EPSG:25832, in the file or by crs="
+            ) from error

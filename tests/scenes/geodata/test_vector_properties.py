@@ -136,6 +136,18 @@ def test_a_member_that_says_no_crs_counts_wherever_it_stands(tmp_path):
     assert read_footprints(file).crs is None
 
 
+@pytest.mark.parametrize("name", ["EPSG:99999999", "urn:ogc:def:crs:EPSG::258320", "my city"])
+def test_a_named_crs_that_is_not_known_is_refused(tmp_path, name):
+    """GDAL says of such a file that it is in degrees, as of one without a CRS."""
+    features = collection([shapely.box(5e5, 5.4e6, 5e5 + 10, 5.4e6 + 10)])["features"]
+    file = tmp_path / "a.geojson"
+    member = {"type": "name", "properties": {"name": name}}
+    file.write_text(json.dumps({"type": "FeatureCollection", "crs": member, "features": features}))
+    with pytest.raises(CRSError, match=f"its CRS '{name}' is not known"):
+        read_footprints(file)
+    assert read_footprints(file, crs="EPSG:25832").crs == "EPSG:25832"
+
+
 def test_degrees_in_other_formats_are_refused(tmp_path):
     write_footprints(Footprints.of(in_degrees(), crs="EPSG:25832"), tmp_path / "a.gpkg")
     with pytest.raises(CRSError, match="are degrees, not metres"):
