@@ -275,7 +275,7 @@ def _preset_entry(name: str) -> Entry:
             "spacing": f"{recipe.point_spacing:g} m",
         }
         meaning = f"synthetic, {recipe.buildings} {recipe.counted}, {recipe.pulse} pulses"
-        parameters = tuple(recipe.parameters().values())
+        parameters = tuple(replace(rule, default=getattr(recipe, rule.name)) for rule in recipe.parameters().values())
     return Entry(
         kind="scenes",
         name=name,

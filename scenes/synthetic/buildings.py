@@ -76,6 +76,8 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
     garages: list[tuple[int, Solid]] = []
     built = np.zeros(len(sites), dtype=bool)
     rows = stream(seed, "rows").random((len(sites), _ROW_DRAWS)) if recipe.row_share > 0 else None
+    # A row of ten houses with annexes takes more numbers than a parcel has.
+    reserve = stream(seed, "long-rows").random((0 if rows is None else len(sites), _DRAWS))
     walls = stream(seed, "party-walls").random((0 if rows is None else len(sites), MOST_HOUSES + 1, DRAWS_OF_WALL))
     taken = _Taken(len(sites) * (8 if rows is None else _MOST_PARTS))
     number = counted = 0
@@ -88,7 +90,7 @@ def build(sites: Sites, terrain: Elevation, recipe: SceneParameters, seed: int) 
         compose = {HALLS: _hall, TOWERS: _tower}.get(zone, compose_house)
         in_row = rows is not None and compose is compose_house and is_row(parcel, recipe)
         if in_row:
-            compose = compose_row
+            compose, draws = compose_row, Draws(np.concatenate([shapes[site], reserve[site]]))
         groups = compose(parcel, recipe, draws)
         # Without its house a parcel has no garage either.
         if not groups or not _fits(groups[0], taken, recipe):

@@ -32,7 +32,7 @@ PARTS = {
         (
             *("terrain", "streets", "zones", "sites", "buildings", "roofs", "colours", "green-roofs", "trees"),
             *("crowns", "clutter", "lidar", "texture", "image", "dem", "reference", "ground"),
-            *("rows", "gap-trees", "party-walls"),
+            *("rows", "gap-trees", "party-walls", "long-rows"),
         )
     )
 }

@@ -47,6 +47,7 @@ def test_scene_folders_are_listed_beside_presets(tmp_path):
 
 
 def test_a_detector_is_explained_with_its_parameters(tmp_path):
+    assert "row_share [0.85]" in roofbench("info", "rows", folder=tmp_path).stdout
     message = roofbench("info", "ndsm", folder=tmp_path).stdout
     assert "ndsm (detector)" in message
     assert "height [2.5 m], from 0.5 to 20 m" in message

@@ -108,3 +108,10 @@ def test_houses_beside_a_wall_with_a_chimney_have_no_other():
         for share in (0.0, 1.0)
     ]
     assert [one.all(axis=1).sum() > 5 for one in bricks] == [True, False]
+
+
+@pytest.mark.parametrize("seed", [3, 5, 8])
+def test_ten_houses_with_annexes_are_a_row(seed):
+    town = preset("rows-small", row_share=1.0, outbuildings=2.0, row_house_width=4.0, buildings=30)
+    solids = make_world(town, seed).solids
+    assert len(np.unique(solids.owner[solids.body == Body.BUILDING])) == 30
