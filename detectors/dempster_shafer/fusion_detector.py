@@ -313,11 +313,11 @@ def _components(mask: _Mask, least: float) -> tuple[NDArray[np.int32], int]:
     """Return connected components of at least so many cells, numbered from 1, and their number."""
     import cv2
 
-    _, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
-    large = statistics[:, cv2.CC_STAT_AREA] >= least
+    _, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
+    large = np.bincount(labels.ravel()) >= least
     large[0] = False
     numbers = np.where(large, np.cumsum(large), 0).astype(np.int32)
-    return numbers[labels], int(large.sum())
+    return numbers.take(labels), int(large.sum())
 
 
 def _without(cues: CueMaps, silent: Collection[str]) -> CueMaps:
