@@ -58,7 +58,8 @@ class Parameter:
     def range_text(self) -> str:
         """The rule in words, for messages and documentation."""
         if self.choices:
-            return "one of " + ", ".join(map(str, self.choices))
+            named = [str(choice) for choice in self.choices if choice != ""]
+            return "one of " + ", ".join(named) + (", or empty" if "" in self.choices else "")
         unit = f" {self.unit}" if self.unit else ""
         if self.minimum is not None and self.maximum is not None:
             return f"from {self.minimum:g} to {self.maximum:g}{unit}"

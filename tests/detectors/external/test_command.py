@@ -280,6 +280,7 @@ def test_a_missing_tool_is_a_skip(program, scene):
     [
         ({}, "give either run"),
         ({"run": " "}, "give either run"),
+        ({"recipe": "x"}, "recipe must be one of cloth-filter, .*, whitebox, or empty, not 'x'"),
         ({"run": "sh", "recipe": "whitebox"}, "give either run"),
         (
             {"run": "no-such-program-anywhere x"},
