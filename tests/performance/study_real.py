@@ -1,9 +1,10 @@
 """Where detectors lose on real scenes: the tables and figures of docs/results/real-scenes.md.
 
 Run by hand: ``python tests/performance/study_real.py causes --folders delft,ign -d mpp -d ndsm`` and the same with
-``ablation``, ``leave-one-out`` or ``pictures``. Folders are scenes with a reference, as `roofbench scenes import`
-writes them. Detectors see the points without classes and without a DEM (it may have been made from the classes), so
-that the ground comes from the ground filter; the image stays.
+``ablation``, ``leave-one-out`` or ``pictures``; ``stored --store FILE`` reads the runs of a store. Folders
+are scenes with a reference, as `roofbench scenes import` writes them. Detectors see the points without classes and
+without a DEM (it may have been made from the classes), so that the ground comes from the ground filter; the image
+stays.
 
 Columns: Q_l object quality, Q_lp pixel quality (threshold-free evaluator, nearest matching, exact areas), agreement
 (area that all footprints have in common with all of the reference over that of both together), and the percent points
@@ -21,6 +22,8 @@ import numpy as np
 import shapely
 
 import roofbench as rb
+from roofbench.benchmark.analysis.report_contents import newest_runs
+from roofbench.benchmark.store.writer import Store
 from roofbench.core.errors import MissingInputError
 from roofbench.detectors.mpp import (
     background,
@@ -145,17 +148,37 @@ def run(detector, scenes, seeds):
 def causes(options):
     """Print a row a scene and detector, and the mean of each detector."""
     scenes = opened(options.folders)
+    table_head()
+    for detector in options.detectors:
+        table_rows(detector, run(detector, scenes, options.seeds))
+
+
+def stored(options):
+    """Print the same of the newest runs of a results store, so that all rows are of one command."""
+    table_head()
+    with Store(Path(options.store), must_exist=True) as store:
+        found = {}
+        for row in newest_runs(store):
+            if row.status == "ok":
+                outcome = scored(store.detections(row.id), store.scene(row.scene_id))
+                found.setdefault(row.label, {})[row.scene] = outcome
+    for label, outcomes in found.items():
+        table_rows(label, outcomes)
+
+
+def table_head():
     names = [cause.replace("_", " ") for cause in CAUSES]
     print(
         f"\n| detector | scene | Q_l | Q_lp | agreement | {' | '.join(names)} |\n|---|---|{'--:|' * (3 + len(names))}"
     )
-    for detector in options.detectors:
-        found = run(detector, scenes, options.seeds)
-        for name, outcome in found.items():
-            print(f"| `{detector}` | {name} | " + " | ".join(f"{v:.1f}" for v in outcome.numbers) + " |", flush=True)
-        if found:
-            mean = np.mean([outcome.numbers for outcome in found.values()], axis=0)
-            print(f"| `{detector}` | **mean** | " + " | ".join(f"**{v:.1f}**" for v in mean) + " |", flush=True)
+
+
+def table_rows(detector, found):
+    for name, outcome in found.items():
+        print(f"| `{detector}` | {name} | " + " | ".join(f"{v:.1f}" for v in outcome.numbers) + " |", flush=True)
+    if found:
+        mean = np.mean([outcome.numbers for outcome in found.values()], axis=0)
+        print(f"| `{detector}` | **mean** | " + " | ".join(f"**{v:.1f}**" for v in mean) + " |", flush=True)
 
 
 @contextmanager
@@ -298,16 +321,23 @@ def draw(panel, scene, k, before, after, margin=6.0, cell=0.5):
     panel.set(xlim=(x0, x0 + 2 * size), ylim=(y0, y0 + 2 * size), xticks=[], yticks=[])
 
 
-STUDIES = {"causes": causes, "ablation": ablation, "leave-one-out": leave_one_out, "pictures": pictures}
+STUDIES = {
+    "causes": causes,
+    "stored": stored,
+    "ablation": ablation,
+    "leave-one-out": leave_one_out,
+    "pictures": pictures,
+}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("study", choices=tuple(STUDIES))
-    parser.add_argument("--folders", required=True, type=lambda text: text.split(","), help="scene folders, by commas")
+    parser.add_argument("--folders", default=[], type=lambda text: text.split(","), help="scene folders, by commas")
     parser.add_argument("-d", dest="detectors", action="append", help="detector [mpp]")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--before", help="folder with the footprints SCENE-0.gpkg of another version")
+    parser.add_argument("--store", help="results store of `roofbench run` on the folders, for stored")
     options = parser.parse_args()
     options.detectors = options.detectors or ["mpp"]
     with remembered() if options.study in ("ablation", "leave-one-out") else nullcontext():
