@@ -8,6 +8,7 @@ session, and processes in sessions of their own (daemons), which are known by a 
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import signal
 import subprocess
@@ -21,12 +22,14 @@ from .errors import ProgramError
 from .memory import bound_allocations, count_program_memory, tree_memory
 from .processes import Limits, clean_environment, end_marked, end_tree, memory_reason, time_reason
 
-__all__ = ["ProgramEnd", "log_tail", "run_program"]
+__all__ = ["ProgramEnd", "log_tail", "run_program", "telling_line"]
 
 #: Variable that a program and all that it starts have in their environment, with a random value.
 _MARK = "ROOFBENCH_PROGRAM"
 _LONGEST_PAUSE = 0.05  # seconds between two checks
 _TAIL = 4000  # bytes of a log that are kept
+#: How errors begin: of R, node, Java, Python and GDAL.
+_ERROR = re.compile(r"(?:[\w.]*(?:Error|Exception)|ERROR|FAILURE|error)\b")
 
 
 @dataclass(frozen=True)
@@ -125,6 +128,22 @@ def log_tail(log: Path) -> str:
         stream.seek(max(0, stream.tell() - _TAIL))
         return stream.read().decode(errors="replace").strip()
     return ""
+
+
+def telling_line(log: str) -> str:
+    r"""Return the line that says why a program failed: the last that begins as an error, else the last one.
+
+    Interpreters end with something else: R with "Execution halted", node with its version.
+
+    >>> telling_line("Error: no package 'sf'\nExecution halted")
+    "Error: no package 'sf'"
+    """
+    lines = [" ".join(line.split()) for line in log.splitlines() if line.strip()]
+    for number in reversed(range(len(lines))):
+        if _ERROR.match(lines[number]):
+            more = 2 if lines[number].endswith(":") else 1
+            return " ".join(lines[number : number + more])
+    return lines[-1] if lines else ""
 
 
 def _exceeded(limits: Limits, seconds: float, peak: int) -> str:

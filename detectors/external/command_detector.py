@@ -25,7 +25,7 @@ from ...core.errors import MissingInputError, ParameterError, ProgramError
 from ...core.package import FOLDER
 from ...core.parameters import execution_option, parameter
 from ...core.processes import Limits, death_reason
-from ...core.program import run_program
+from ...core.program import run_program, telling_line
 from ...scenes.folder import save_scene
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.las_files import write_points
@@ -161,11 +161,12 @@ class Command(Detector):
                 environment={"TMPDIR": str(work), **environment},
             )
             program = self.recipe or Path(command[0]).name
-            last = " ".join(end.log.splitlines()[-1:])
             if end.code == _SKIP:
+                last = " ".join(end.log.splitlines()[-1:])
                 raise MissingInputError(f"{program} cannot run here: {last or 'it gives no reason'}")
             if end.code:
-                raise ProgramError(death_reason(end.code, program) + (f": {last}" if last else ""), log=end.log)
+                cause = telling_line(end.log)
+                raise ProgramError(death_reason(end.code, program) + (f": {cause}" if cause else ""), log=end.log)
             return read_output(output, crs=scene.crs, program=program, log=end.log)
 
     def _command(self, scene: Path, parameters: Path, output: Path) -> tuple[list[str], dict[str, str]]:

@@ -18,6 +18,7 @@ from roofbench.benchmark.plan import make_plan
 from roofbench.benchmark.store.writer import Store
 from roofbench.benchmark.suite import DetectorEntry, Suite, read_suite
 from roofbench.core.errors import MissingInputError, ParameterError, ProgramError
+from roofbench.core.program import telling_line
 from roofbench.detectors.registry import make_detector
 from roofbench.evaluators.registry import make_evaluator
 from roofbench.scenes.builtin import hamlet
@@ -104,6 +105,22 @@ def test_a_failure_is_one_sentence(program, scene, case):
         rb.detect(scene, program(body, **limits))
     assert "\n" not in str(raised.value)
     assert "/tmp" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("printed", "line"),
+    [
+        ("Loading\nError: no roofs\nExecution halted", "Error: no roofs"),
+        ("Error in f(x) : \n  too few points\nCalls: f\nExecution halted", "Error in f(x) : too few points"),
+        ("TypeError: x is undefined\n    at main (d.js:1:2)\n\nNode.js v20.20.2", "TypeError: x is undefined"),
+        ("ERROR 1: first\nERROR 4: no such file\nUsage: tool a b", "ERROR 4: no such file"),
+        ("java.lang.RuntimeException: bad\n\tat Main.main(Main.java:3)", "java.lang.RuntimeException: bad"),
+        ("no errors so far\nstopped", "stopped"),
+        ("", ""),
+    ],
+)
+def test_the_line_that_says_why_a_program_failed(printed, line):
+    assert telling_line(printed) == line
 
 
 def test_the_log_of_a_failure_is_kept(program, scene):
