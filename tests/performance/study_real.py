@@ -1,7 +1,7 @@
 """Where detectors lose on real scenes: the tables and figures of docs/results/real-scenes.md.
 
 Run by hand: ``python tests/performance/study_real.py causes --folders delft,ign -d mpp -d ndsm`` and the same with
-``ablation``, ``leave-one-out`` or ``pictures``; ``stored --store FILE`` reads the runs of a store. Folders
+``displaced``, ``ablation``, ``leave-one-out`` or ``pictures``; ``stored --store FILE`` reads a store. Folders
 are scenes with a reference, as `roofbench scenes import` writes them. Detectors see the points without classes and
 without a DEM (it may have been made from the classes), so that the ground comes from the ground filter; the image
 stays.
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +68,12 @@ OF_PREPARATION = (
     (background, "_WITHOUT_OPENNESS"),
     (image_cue, "_WEIGHT"),
     (cue_information, "_LEAST_SEPARATION"),
+)
+
+#: Copies of a scene: metres east and north, and share of the points.
+COPIES = (
+    *((0.0, 0.0, 1.0), (37.3, 0.0, 1.0), (0.0, 37.3, 1.0), (64.2, 64.1, 1.0), (91.7, 20.6, 1.0)),
+    *((0.0, 0.0, 0.5), (37.3, 64.3, 0.5), (0.0, 0.0, 0.3)),
 )
 
 
@@ -321,9 +327,40 @@ def draw(panel, scene, k, before, after, margin=6.0, cell=0.5):
     panel.set(xlim=(x0, x0 + 2 * size), ylim=(y0, y0 + 2 * size), xticks=[], yticks=[])
 
 
+def displaced(options):
+    """Print the qualities of each scene as it is, and the mean with its moved and thinned copies."""
+    print("\n| detector | scene | as it is | mean of copies |\n|---|---|--:|--:|")
+    for detector in options.detectors:
+        for name, scene in opened(options.folders).items():
+            copies = {str(copy): moved(scene, *copy) for copy in COPIES}
+            outcomes = list(run(detector, copies, options.seeds).values())
+            mean = np.mean([(outcome.object, outcome.pixel) for outcome in outcomes], axis=0)
+            first = f"{outcomes[0].object:.1f} / {outcomes[0].pixel:.1f}"
+            print(f"| `{detector}` | {name} | {first} | {mean[0]:.1f} / {mean[1]:.1f} |", flush=True)
+
+
+def moved(scene, east, north, share):
+    """Return a copy of a scene elsewhere, with a share of its points; it has no image."""
+    points = scene.points
+    if share < 1:
+        points = points.take(np.random.default_rng(0).random(len(points)) < share)
+    by = np.array([east, north])
+    polygons = shapely.transform(scene.reference.polygons, lambda places: places + by)
+    xmin, ymin, xmax, ymax = scene.extent
+    return rb.Scene(
+        scene.name,
+        (xmin + east, ymin + north, xmax + east, ymax + north),
+        crs=scene.crs,
+        points=replace(points, x=points.x + east, y=points.y + north),
+        reference=rb.Footprints.of(polygons, crs=scene.crs),
+        area=None if scene.area is None else shapely.transform(scene.area, lambda places: places + by),
+    )
+
+
 STUDIES = {
     "causes": causes,
     "stored": stored,
+    "displaced": displaced,
     "ablation": ablation,
     "leave-one-out": leave_one_out,
     "pictures": pictures,
