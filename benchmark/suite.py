@@ -331,6 +331,8 @@ def _scene_entry(entry: Mapping[str, Any], folder: Path, places: _Places, number
             value = str(entry[source])
             if source == "path":
                 place = value if is_address(value) else folder / value
+                if value in shipped_names() and not (folder / value).exists():
+                    raise InputError(f'there is no folder {place}; the scene of roofbench is named by name = "{value}"')
                 yield SceneRecipe.of_folder(place, tile=float(tile))
             else:
                 yield SceneRecipe.of_shipped(value)

@@ -113,3 +113,5 @@ def test_a_scene_that_comes_with_roofbench_is_named_in_a_suite(suite_file):
     assert [scene.word for scene in suite.scenes] == ["delft"]
     with pytest.raises(RoofbenchError, match=r"line 4: no scene called 'delf' comes with roofbench .*'delft'"):
         read_suite(suite_file(GOOD.replace('preset = "hamlet"', 'name = "delf"').replace("seeds = [4, 7]\n", "")))
+    with pytest.raises(RoofbenchError, match=r'line 4: there is no folder .*delft; .* is named by name = "delft"'):
+        read_suite(suite_file(GOOD.replace('preset = "hamlet"', 'path = "delft"').replace("seeds = [4, 7]\n", "")))
