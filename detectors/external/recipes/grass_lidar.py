@@ -8,14 +8,13 @@ are read without topology, as the manual of ``v.in.ascii`` advises for many poin
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import NearestNDInterpolator
 from scipy.spatial import cKDTree
 
-from .recipe_scene import RecipeCall, leave, read_call, require_program, write_buildings
+from .recipe_scene import RecipeCall, leave, read_call, require_program, run_tool, write_buildings
 
 __all__ = ["main"]
 
@@ -40,8 +39,7 @@ def main() -> None:
     region = _write_points(call)
     script = Path("steps.sh")
     script.write_text(_SCRIPT.format(**region, step=float(call.settings["step"])), encoding="utf-8")
-    command = ["grass", "--tmp-location", "XY", "--exec", "sh", str(script)]
-    subprocess.run(command, check=True)  # noqa: S603 - the program of the recipe, with its own script
+    run_tool(["grass", "--tmp-location", "XY", "--exec", "sh", str(script)])
     corrected, terrain = np.loadtxt("corrected.txt", ndmin=2), np.loadtxt("terrain.txt", ndmin=2)
     below = NearestNDInterpolator(terrain[:, :2], terrain[:, 2])
     found = corrected[corrected[:, -1] == _BUILDING]
