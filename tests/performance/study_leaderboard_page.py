@@ -4,6 +4,7 @@ Run by hand: ``python tests/performance/study_leaderboard_page.py board/roofbenc
 Stored detections are evaluated here, so that no detector runs. Runs of other code than the installed one are left out;
 REVISION is that of the installed code. ``--programs STORE REVISION`` takes the runs of programs of others (`command`)
 from another store, made by roofbench as it was at a revision: they take hours and do not depend on the detectors here.
+It can be repeated; a run counts in the last store that has it.
 """
 
 from __future__ import annotations
@@ -55,13 +56,22 @@ def newest(store):
     return last_of(row for row in rows if store.code(row.id).digest == digests[row.detector])
 
 
-def newest_of_programs(store):
-    """Return the last run of every program of others on every scene."""
-    return last_of(sorted((row for row in store.runs() if row.label in PROGRAMS), key=lambda row: row.id))
+def newest_of_programs(stores):
+    """Return the last run of every program of others on every scene, of the last store that has one, by store."""
+    known, parts = set(), []
+    for store in reversed(stores):
+        rows = last_of(sorted((row for row in store.runs() if row.label in PROGRAMS), key=lambda row: row.id))
+        parts.append([row for row in rows if run_of(row) not in known])
+        known |= set(map(run_of, rows))
+    return parts[::-1]
 
 
 def last_of(rows):
-    return list({(row.label, row.scene, row.seed): row for row in rows}.values())
+    return list({run_of(row): row for row in rows}.values())
+
+
+def run_of(row):
+    return row.label, row.scene, row.seed
 
 
 def column_of(row):
@@ -72,10 +82,9 @@ def column_of(row):
     return row.scene if row.scene in REAL else None
 
 
-def qualities(store, rows, matching):
-    """Return object and pixel quality of every good run, percent, by label and column."""
+def add_qualities(found, store, rows, matching):
+    """Add object and pixel quality of every good run, percent, by label and column."""
     evaluator = rb.make_evaluator("threshold-free", matching=matching)
-    found = defaultdict(lambda: defaultdict(list))
     scenes = {}
     for row in rows:
         column = column_of(row)
@@ -84,7 +93,6 @@ def qualities(store, rows, matching):
         scene = scenes.setdefault(row.scene_id, store.scene(row.scene_id))
         values = evaluator.evaluate(store.detections(row.id), scene.reference, area=scene.area, grid=scene.grid).values
         found[row.label][column].append(tuple(values[name] for name in QUALITY))
-    return found
 
 
 def cell(values):
@@ -138,7 +146,7 @@ def page(parts):
     by_matching = {matching: defaultdict(lambda: defaultdict(list)) for matching in MATCHINGS}
     for matching, found in by_matching.items():
         for store, some, _ in parts:
-            found.update(qualities(store, some, matching))
+            add_qualities(found, store, some, matching)
     good = sum(row.status == "ok" for row in rows)
     made = "; ".join(f"{names_of(some)} at revision {revision}, {days_of(some)}" for _, some, revision in parts if some)
     lines = [
@@ -177,17 +185,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("store", type=Path)
     parser.add_argument("revision")
-    parser.add_argument("--programs", nargs=2, metavar=("STORE", "REVISION"))
+    parser.add_argument("--programs", nargs=2, action="append", default=[], metavar=("STORE", "REVISION"))
     options = parser.parse_args()
     with ExitStack() as stack:
         store = stack.enter_context(Store(options.store))
         rows = newest(store)
         parts = [(store, rows, options.revision)]
         if options.programs:
-            file, revision = options.programs
-            others = stack.enter_context(Store(Path(file)))
+            others = [stack.enter_context(Store(Path(file))) for file, _ in options.programs]
+            revisions = [revision for _, revision in options.programs]
             own = [row for row in rows if row.label not in PROGRAMS]
-            parts = [(store, own, options.revision), (others, newest_of_programs(others), revision)]
+            parts = [(store, own, options.revision), *zip(others, newest_of_programs(others), revisions, strict=True)]
         print(page(parts), end="")
 
 
