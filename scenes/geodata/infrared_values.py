@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 __all__ = ["unlike_infrared"]
 
-#: A band with fewer values is a mask or a count.
+#: A band with fewer values is a mask or a count, where the colours have more.
 _FEWEST_VALUES = 8
 #: Share of the pixels that may be empty or white: masks with soft borders have few others.
 _MOST_AT_ENDS = 0.5
@@ -38,19 +38,25 @@ def unlike_infrared(values: _Band, others: Mapping[str, _Band]) -> str | None:
     >>> band = np.arange(1, 200, dtype=np.uint8)
     >>> unlike_infrared(band // 100, {"red": band})
     'holds 2 values only, as a mask does'
+    >>> unlike_infrared(np.full_like(band, 220), {"red": np.full_like(band, 200)}) is None
+    True
     >>> unlike_infrared(band, {"red": band})
     'equals the red band'
     >>> unlike_infrared(band, {"red": band[::-1] // 2 * 3 % 200}) is None
     True
     """
     levels = np.unique(values)
-    if len(levels) < _FEWEST_VALUES:
+    # Beside colours that are as flat, few values say nothing, and neither do equal ones.
+    pictures = any(len(np.unique(other)) >= _FEWEST_VALUES for other in others.values())
+    if len(levels) < _FEWEST_VALUES and (pictures or levels[-1] <= 1):
         return f"holds {len(levels)} value{'s' * (len(levels) != 1)} only, as a mask does"
     white = np.iinfo(values.dtype).max
     pictured = np.any([(other > 0) & (other < white) for other in others.values()], axis=0)
     at_ends = float(np.isin(values[pictured], (0, white)).mean()) if pictured.any() else 0.0
     if at_ends > _MOST_AT_ENDS:
         return f"is 0 or {white} in {at_ends:.0%} of the pixels, as a mask is"
+    if not pictures:
+        return None
     for name, other in others.items():
         if (other == values).mean() > _MOST_EQUAL:
             return f"equals the {name} band"
