@@ -43,7 +43,9 @@ LEVEL = 0.05
 HALF_SPLITS = 50
 
 _MOST_ENUMERATED = 16  # 2^16 sign patterns
-_LATTICE = 4096  # steps between zero and the largest difference
+#: Steps between zero and the largest difference, for so many differences at most; beyond, their number falls with the
+#: square root of the count, so that the time grows as the count.
+_LATTICE, _FINE = 4096, 64
 _Z = 1.959963984540054  # two-sided 95 %
 
 
@@ -75,8 +77,9 @@ def sign_flip_p(differences: ArrayLike) -> float:
     found. It only assumes that differences are symmetric under the null hypothesis. If all differences are 0, it is 1.
     Adding a constant to all differences never lowers it.
 
-    Up to 16 differences every pattern is enumerated. With more, differences are rounded to 1/4096 of the largest, and
-    the distribution of their sum is computed on that lattice. This is exact again, because rounding keeps symmetry.
+    Up to 16 differences every pattern is enumerated. With more, differences are rounded to 1/4096 of the largest (more
+    coarsely beyond 64 differences), and the distribution of their sum is computed on that lattice. This is exact again,
+    because rounding keeps symmetry.
 
     Examples
     --------
@@ -85,21 +88,28 @@ def sign_flip_p(differences: ArrayLike) -> float:
     >>> sign_flip_p([1.0, -1.0, 0.0])
     0.75
     """
+    return _tails(differences)[0]
+
+
+def _tails(differences: ArrayLike) -> tuple[float, float]:
+    """Return the shares of all sign patterns whose sum is at most, and at least, the one found."""
     numbers = np.asarray(differences, dtype=np.float64)
     scale = np.abs(numbers).max(initial=0.0)
     if scale == 0:
-        return 1.0
+        return 1.0, 1.0
     if len(numbers) > _MOST_ENUMERATED:
-        return _lattice_p(np.rint(numbers / scale * _LATTICE).astype(np.int64))
+        steps = round(_LATTICE * min(1.0, math.sqrt(_FINE / len(numbers))))
+        return _lattice_tails(np.rint(numbers / scale * steps).astype(np.int64))
     numbers = np.round(numbers / scale, 12)  # ties among sums must not depend on the last bit
     sums = np.zeros(1)
     for number in numbers:
         sums = np.concatenate([sums + number, sums - number])
-    return float((sums <= numbers.sum() + 1e-9).mean())
+    found = numbers.sum()
+    return float((sums <= found + 1e-9).mean()), float((sums >= found - 1e-9).mean())
 
 
-def _lattice_p(numbers: NDArray[np.int64]) -> float:
-    """Return the share of sign patterns of whole numbers whose sum is at most the one found.
+def _lattice_tails(numbers: NDArray[np.int64]) -> tuple[float, float]:
+    """Return the tails of whole numbers, see `_tails`.
 
     A sum is as low as the one found exactly when the numbers whose sign turned add up to at least zero. Counted in
     steps of two, the sums reach from minus to plus the sum of magnitudes.
@@ -115,7 +125,8 @@ def _lattice_p(numbers: NDArray[np.int64]) -> float:
         reached += int(size)
         chances[: reached + 1] = after
     found = int(numbers[numbers > 0].sum())
-    return float(min(1.0, chances[: found + 1].sum()))
+    # The sums are symmetric: a tail from above is added up from its thin end, too.
+    return float(min(1.0, chances[: found + 1].sum())), float(min(1.0, chances[: total - found + 1].sum()))
 
 
 def paired_p(differences: ArrayLike) -> float:
@@ -126,8 +137,8 @@ def paired_p(differences: ArrayLike) -> float:
     >>> paired_p([1.0, 2.0, 3.0, 4.0, 5.0])  # all of one sign: 2 ** (1 - 5)
     0.0625
     """
-    numbers = np.asarray(differences, dtype=np.float64)
-    return min(1.0, 2 * sign_flip_p(numbers), 2 * sign_flip_p(-numbers))
+    low, high = _tails(differences)
+    return min(1.0, 2 * low, 2 * high)
 
 
 def lowest_p(count: int) -> float:

@@ -5,6 +5,7 @@ import pytest
 from harness.effort import examples
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import norm
 
 from roofbench.benchmark.analysis.inference import (
     HALF_SPLITS,
@@ -37,6 +38,19 @@ def test_the_test_of_many_differences_agrees_with_enumeration(differences):
     for difference in differences:
         sums = np.concatenate([sums + difference, sums - difference])
     assert sign_flip_p(differences) == pytest.approx((sums <= sum(differences)).mean())
+
+
+@pytest.mark.parametrize("count", [17, 30, 300, 1000])
+def test_both_tails_are_those_of_the_differences_and_of_their_opposites(count):
+    differences = np.random.default_rng(count).normal(0.05, 1, count)
+    assert paired_p(differences) == 2 * min(sign_flip_p(differences), sign_flip_p(-differences))
+
+
+@pytest.mark.parametrize("count", [100, 1000])
+def test_the_test_of_very_many_differences_nears_the_normal_distribution(count):
+    differences = np.random.default_rng(count).normal(-0.1, 1, count)
+    expected = norm.cdf(differences.sum() / np.sqrt((differences**2).sum()))
+    assert sign_flip_p(differences) == pytest.approx(expected, rel=0.1)
 
 
 @given(st.lists(st.floats(-1, 1), min_size=1, max_size=40), st.floats(0, 2))
