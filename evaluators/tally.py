@@ -144,9 +144,12 @@ class Histogram:
 
     def weighted_sums(self, values: Sequence[Histogram], weights: NDArray[np.int64]) -> Iterator[Self]:
         """Yield sums of histograms, each taken as many times as its weight says; see `Additive`."""
-        counts, sums = (np.stack([getattr(value, name) for value in values]) for name in ("counts", "sums"))
-        for row in weights:
-            yield dataclasses.replace(self, counts=row @ counts, sums=row.astype(np.float64) @ sums)
+        # Whole numbers are exact as floats, whose products are a hundred times as fast.
+        counts, sums = (
+            np.stack([getattr(value, name) for value in values], dtype=float) for name in ("counts", "sums")
+        )
+        for row in weights.astype(np.float64):
+            yield dataclasses.replace(self, counts=(row @ counts).astype(np.int64), sums=row @ sums)
 
 
 def histogram(*, low: float, high: float, bins: int) -> Callable[[], Histogram]:

@@ -87,11 +87,13 @@ def test_what_is_forked_had_one_thread(process, task_of):
 def test_the_processor_time_of_detectors_counts_as_that_of_children(task_of):
     resource = pytest.importorskip("resource", reason="this system does not count it")
     process = IsolatedProcess()
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     process.call(task_of("burns").to_json(), Limits())
     running = psutil.Process(process._process.pid).children(recursive=True)
     process.close()
-    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before > 1.0
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    # The detector ends after one second of user and system time, see `misbehaving.py`.
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime >= 1.0
     assert not any(child.is_running() for child in running)
 
 
