@@ -38,6 +38,7 @@ from ...core.kernels import kernel
 from ...scenes.geodata.density import point_counts, spacing_of_counts
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Elevation, Grid
+from ..shared.selection import ordered_value
 from .nearest_points import nearest_kind
 
 __all__ = ["Masks", "build_cell_masks", "build_masks", "ground_correction", "ground_heights", "pulse_spacing"]
@@ -241,32 +242,8 @@ def _lowest(
     for k in range(cells):
         allowed = math.floor(share * (starts[k + 1] - starts[k]))
         if ends[k] - starts[k] > allowed:
-            lowest[k] = _ranked(heights[starts[k] : ends[k]], allowed)
+            lowest[k] = ordered_value(heights[starts[k] :], ends[k] - starts[k], allowed)
     return lowest
-
-
-@kernel
-def _ranked(values: NDArray[np.float32], rank: int) -> np.float32:
-    """Return the value with `rank` values before it in rising order; the values are reordered in place (Hoare)."""
-    first, last = 0, len(values) - 1
-    while first < last:
-        pivot = values[(first + last) // 2]
-        i, j = first, last
-        while i <= j:
-            while values[i] < pivot:
-                i += 1
-            while values[j] > pivot:
-                j -= 1
-            if i <= j:
-                values[i], values[j] = values[j], values[i]
-                i, j = i + 1, j - 1
-        if rank <= j:
-            last = j
-        elif rank >= i:
-            first = i
-        else:
-            break
-    return np.float32(values[rank])
 
 
 def _hits(

@@ -28,11 +28,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.kernels import kernel
+from ..shared.selection import ordered_value
 from .arrays import Heights, Integers, Labels, Mask, Rectangles, States
 from .cells import HIGH, LOW, VOID
 from .rectangles import overlap_area, row_span
 from .reshaping import move_edge
-from .selection import ordered_value
 from .threads import ONE_THREAD, Threads
 
 __all__ = ["lower_storeys"]
@@ -295,7 +295,7 @@ def _base_of(surface: _Surface, box: Rectangles, known: Integers) -> int:
             known[side] += 1
     if n < _FEWEST_CELLS:
         return -1
-    base = ordered_value(border, n, n // 2)
+    base = int(ordered_value(border, n, n // 2))
     level, higher = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
     for i in range(len(cells)):
         r, c, side = cells[i, 0], cells[i, 1], cells[i, 2]

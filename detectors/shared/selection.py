@@ -1,6 +1,8 @@
-"""Selection: order statistics of a few values, such as their median."""
+"""Selection: order statistics of values, such as their median."""
 
 from __future__ import annotations
+
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +11,11 @@ from ...core.kernels import kernel
 
 __all__ = ["ordered_value"]
 
+_Value = TypeVar("_Value", np.int32, np.float32)
+
 
 @kernel
-def ordered_value(values: NDArray[np.int32], count: int, place: int) -> int:
+def ordered_value(values: NDArray[_Value], count: int, place: int) -> _Value:
     """Return the value at a place of the sorted first `count` values, which are reordered in place.
 
     Quickselect (Hoare 1961). ``np.partition`` returns the same, but takes seconds to compile.
@@ -37,4 +41,5 @@ def ordered_value(values: NDArray[np.int32], count: int, place: int) -> int:
             low = i
         else:
             break
-    return int(values[place])
+    found: _Value = values[place]
+    return found
