@@ -232,6 +232,7 @@ def draw(found):
                 label=label,
             )
         panel.set_xscale("log")
+        panel.set_ylim(-3, 103)
         panel.set_title(name, fontsize=10)
         panel.grid(alpha=0.3)
     for panel in panels[len(found) :]:

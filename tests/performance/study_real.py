@@ -277,6 +277,7 @@ def merit(outcomes, left_out):
 def pictures(options):
     """Draw the two references a scene on which the footprints of ``--before`` lose most, with those of now."""
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
     from PIL import Image as Picture
 
     scenes = opened(options.folders)
@@ -293,6 +294,8 @@ def pictures(options):
     for panel, (name, k, before, after) in zip(panels, candidates, strict=False):
         draw(panel, scenes[name], k, before, after)
         panel.set_title(name, fontsize=9)
+    lines = [Line2D([], [], color=colour, linewidth=2) for colour in ("C2", "C3", "C0")]
+    figure.legend(lines, ("reference", "mpp before", "mpp now"), loc="outside lower center", ncols=3, frameon=False)
     file = IMAGES / "real-scenes-worst.png"
     figure.savefig(file, dpi=80)
     with Picture.open(file) as picture:
