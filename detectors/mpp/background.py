@@ -35,6 +35,8 @@ _ROOF_ROUGHNESS, _CROWN_ROUGHNESS = (0.05, 0.75), (0.40, 0.55)
 _COMMON = 0.5
 _ROOF_OPENNESS = (0.70, 0.12, 0.07, 0.04, 0.03, 0.02, 0.01, 0.01)
 _CROWN_OPENNESS = (0.22, 0.10, 0.10, 0.10, 0.10, 0.12, 0.12, 0.14)
+#: Middle of each bin of openness.
+_OPENNESS = (np.arange(OPENNESS_BINS) + 0.5) / OPENNESS_BINS
 #: Pseudo-counts of each class: cells at least, and share of the cells.
 _PSEUDO_CELLS, _PSEUDO_SHARE = 200.0, 0.1
 #: Nats in favour of a roof where openness is not known: roughness alone takes half of an old town for crowns.
@@ -61,6 +63,8 @@ class Background:
         Share of cells in crowns.
     roof_roughness, crown_roughness : float
         Median roughness, metres.
+    crown_openness : float
+        Mean openness of crowns, 0 to 1; nan where openness is not known.
     evidence : tuple of tuple of float
         Nats per bin of log roughness and of openness, (24, 8).
     cells : int
@@ -72,6 +76,7 @@ class Background:
     crown_share: float
     roof_roughness: float
     crown_roughness: float
+    crown_openness: float
     evidence: tuple[tuple[float, ...], ...]
     cells: int
 
@@ -165,6 +170,7 @@ def estimate_background(tally: Integers, cell: float, *, openness: bool = True) 
         crown_share=share,
         roof_roughness=math.exp(means[0]),
         crown_roughness=math.exp(means[1]),
+        crown_openness=float(opens[1] @ _OPENNESS) if openness else math.nan,
         evidence=tuple(tuple(float(value) for value in row) for row in evidence),
         cells=size_of_sample,
     )

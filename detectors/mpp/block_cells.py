@@ -8,7 +8,8 @@ core
     High cells with evidence for a roof, wherever they are, and all but low cells inside rectangles.
 gap
     High cells without evidence, narrower than `_NARROW`, between cells of the core: rough corners, roofed passages and
-    yards, and crowns. A gap between two blocks rises `_CROWN_RISE` above the roofs beside it where a crown stands.
+    yards, and crowns. A gap between two blocks is a crown where it rises `_CROWN_RISE` above the roofs beside it, or
+    where as many pulses pass it, or return from it in parts, as from the crowns of the scene (`openness`, see `cells`).
 rim
     High cells within `_RIM` of a block at the height of the roof beside them: the window of texture of the eaves holds
     walls, ground and what grows there, so that it is rough whatever the roof is.
@@ -31,6 +32,8 @@ _SIGMA, _OPENING, _NARROW, _RIM = 0.75, 1.0, 5.0, 1.0
 #: Centimetres: what rises by a storey above the roofs beside it is no part of them, and largest step between a roof and
 #: its rim (`roof_step`).
 _CROWN_RISE, _RIM_STEP = 250, 50
+#: Share of the openness of crowns from which a gap between two blocks is a crown: through roofs few pulses pass.
+_AS_OPEN = 0.65
 #: Square metres: largest hole that is filled.
 _HOLE = 10.0
 #: Share of a block that must lie inside rectangles.
@@ -39,7 +42,15 @@ _CONFIRMED = 0.5
 _AROUND = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column)
 
 
-def built_cells(rectangles: Rectangles, gsd: float, height: NDArray[np.uint16], state: States, score: Scores) -> Mask:
+def built_cells(
+    rectangles: Rectangles,
+    gsd: float,
+    height: NDArray[np.uint16],
+    state: States,
+    score: Scores,
+    openness: States,
+    crown_openness: float,
+) -> Mask:
     """Return the cells of the blocks that rectangles, shape (n, 5), belong to.
 
     Parameters
@@ -54,6 +65,10 @@ def built_cells(rectangles: Rectangles, gsd: float, height: NDArray[np.uint16], 
         See `cells`.
     score : ndarray of int16, shape (rows, columns)
         See `scores`.
+    openness : ndarray of uint8, shape (rows, columns)
+        See `cells`.
+    crown_openness : float
+        Mean openness of crowns, 0 to 1; nan where it is not known.
     """
     import cv2
 
@@ -63,9 +78,11 @@ def built_cells(rectangles: Rectangles, gsd: float, height: NDArray[np.uint16], 
     sure = inside & (state != LOW)
     core = (high & (around > 0)) | sure
     gaps = high & closed(core, 0.5 * _NARROW / gsd) & ~core
-    rising = gaps & (height > _roofs_around(core & high, height, gsd).astype(np.int32) + _CROWN_RISE)
-    if rising.any():
-        gaps &= ~_crowns(rising, gaps, _whole(core, sure, gsd))
+    if gaps.any():
+        rising = height > _roofs_around(core & high, height, gsd).astype(np.int32) + _CROWN_RISE
+        gap, between = _between(gaps, _whole(core, sure, gsd))
+        crowns = _means(openness, gap, len(between)) >= 255 * _AS_OPEN * crown_openness
+        gaps &= ~((rising | crowns[gap]) & between[gap])
     built = _whole(core | gaps, sure, gsd)
     built = _with_rims(built, height, high, max(round(_RIM / gsd), 1))
     _, labels = cv2.connectedComponents(built.astype(np.uint8), connectivity=4)
@@ -94,8 +111,8 @@ def _roofs_around(roof: Mask, height: NDArray[np.uint16], gsd: float) -> NDArray
     return closed_heights(np.where(roof, height, np.uint16(0)), 0.5 * _NARROW / gsd)
 
 
-def _crowns(rising: Mask, gaps: Mask, apart: Mask) -> Mask:
-    """Return the cells of gaps between two blocks of a mask that rise above the roofs on both sides."""
+def _between(gaps: Mask, apart: Mask) -> tuple[Labels, NDArray[np.bool_]]:
+    """Return the number of the gap of each cell, 0 outside gaps, and which gaps lie between two blocks of a mask."""
     row, column = np.nonzero(gaps)
     blocks, gap = _components(apart), _components(gaps)[1:-1, 1:-1]
     own = gap[row, column]
@@ -103,7 +120,14 @@ def _crowns(rising: Mask, gaps: Mask, apart: Mask) -> Mask:
     least, most = np.full(own.max() + 1, np.iinfo(np.int32).max), np.zeros(own.max() + 1, np.int32)
     np.minimum.at(least, own, lowest)
     np.maximum.at(most, own, highest)
-    return np.asarray(rising & (least < most)[gap])
+    return gap, np.asarray(least < most)
+
+
+def _means(values: States, labels: Labels, count: int) -> NDArray[np.float64]:
+    """Return the mean of the values of each label, shape (count,)."""
+    cells = np.bincount(labels.ravel(), minlength=count)
+    total = np.bincount(labels.ravel(), weights=values.ravel(), minlength=count)
+    return np.asarray(total / np.maximum(cells, 1))
 
 
 def _labels_beside(

@@ -40,7 +40,9 @@ def outline_blocks(
     height: NDArray[np.uint16],
     state: NDArray[np.uint8],
     score: NDArray[np.int16],
+    openness: NDArray[np.uint8],
     *,
+    crown_openness: float,
     within: Any = None,
 ) -> NDArray[np.object_]:
     """Return the polygons, with courtyards as holes, of the blocks that rectangles, shape (n, 5), belong to.
@@ -56,11 +58,15 @@ def outline_blocks(
         See `cells`.
     score : ndarray of int16, shape (rows, columns)
         See `scores`.
+    openness : ndarray of uint8, shape (rows, columns)
+        See `cells`.
+    crown_openness : float
+        Mean openness of crowns, 0 to 1; nan where it is not known.
     within : shapely Polygon, optional
         Blocks that do not meet it are left out.
     """
     gsd = grid.gsd
-    traced = _traced(built_cells(rectangles, gsd, height, state, score), grid)
+    traced = _traced(built_cells(rectangles, gsd, height, state, score, openness, crown_openness), grid)
     if within is not None:
         traced = traced[shapely.intersects(traced, within)]
     polygons: NDArray[np.object_] = regularise(traced, max(gsd, _STRAIGHT), reach=_REACH)

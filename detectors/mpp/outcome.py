@@ -57,7 +57,16 @@ def as_footprints(
     those of their largest part, with the energies added up.
     """
     wanted = shapely.box(*prepared.core).buffer(_AROUND, join_style="mitre")
-    blocks = outline_blocks(rectangles, prepared.grid, prepared.height, prepared.state, prepared.score, within=wanted)
+    blocks = outline_blocks(
+        rectangles,
+        prepared.grid,
+        prepared.height,
+        prepared.state,
+        prepared.score,
+        prepared.openness,
+        crown_openness=prepared.background.crown_openness,
+        within=wanted,
+    )
     near = _near(shapely.polygons(to_world(rectangles, prepared.grid)), blocks, wanted)
     rectangles, energies, fits = rectangles[near], energies[near], [fits[k] for k in np.flatnonzero(near).tolist()]
     if level == "block":

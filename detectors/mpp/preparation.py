@@ -68,6 +68,8 @@ class Prepared:
         See `cells`.
     score : ndarray of int16, shape (rows, columns)
         Thousandths of a nat.
+    openness : ndarray of uint8, shape (rows, columns)
+        See `cells`.
     structures : ndarray of uint8, shape (rows, columns)
         Centimetres, at most 255, by which cells were lowered to the roof below them.
     background : Background
@@ -87,6 +89,7 @@ class Prepared:
     height: NDArray[np.uint16]
     state: States
     score: Scores
+    openness: States
     structures: NDArray[np.uint8]
     background: Background
     tables: Tables
@@ -106,7 +109,9 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
             f"not reach over more than {LONGEST} cells: lower it to {math.floor(LONGEST * cell / math.sqrt(2))}, "
             f"or raise cell"
         )
-    background, height, state, score, fitted, structures, cues = _classes(parameters, points, scene, cell, threads)
+    background, height, state, score, openness, fitted, structures, cues = _classes(
+        parameters, points, scene, cell, threads
+    )
     least = math.ceil(_SMALLEST_BOX / cell**2)
     division = _division(parameters, Grid.covering(scene.extent, cell))
     boxes = propose_boxes(height, fitted, steps=_BOX_STEPS, least_cells=least, division=division, threads=threads)
@@ -117,7 +122,19 @@ def prepare(parameters: MPPParameters, points: PointCloud, scene: Scene, threads
     model, grid = _model(parameters, cell), Grid.covering(scene.extent, cell)
     rated = _rated(boxes, tables, model, threads)
     return Prepared(
-        grid, kept, state, score, structures, background, tables, model, rated, cues, scene.core, lambda: scene.image
+        grid,
+        kept,
+        state,
+        score,
+        openness,
+        structures,
+        background,
+        tables,
+        model,
+        rated,
+        cues,
+        scene.core,
+        lambda: scene.image,
     )
 
 
@@ -167,13 +184,14 @@ class _Classes(NamedTuple):
     height: Heights
     state: States
     score: Scores
+    openness: States
     fitted: Mask
     structures: NDArray[np.uint8]
     cues: CueInformation
 
 
 def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: float, threads: Threads) -> _Classes:
-    """Return the classes of the scene, and height, state, score, whether it is fitted and structures of each cell."""
+    """Return the classes of the scene, and of each cell height, state, score, openness, if it is fitted, structures."""
     low = _LOW_SHARE * parameters.least_height
     grid, ground = Grid.covering(scene.extent, cell), scene.heights.ground
     cells = make_cells(points, ground, grid, low=low, threads=threads)
@@ -206,7 +224,7 @@ def _classes(parameters: MPPParameters, points: PointCloud, scene: Scene, cell: 
     score = score_cells(cells, bins, background, weights, threads=threads)
     if MULTIPLE not in cues.used and parameters.texture_weight > 0:
         score, cues = _with_image(scene, cells, score, cues, parameters.texture_weight)
-    return _Classes(background, cells.height, cells.state, score, fitted, structures, cues)
+    return _Classes(background, cells.height, cells.state, score, cells.openness, fitted, structures, cues)
 
 
 def _with_image(

@@ -1,5 +1,7 @@
 """The size of cells, the classes of their textures, and their scores."""
 
+import math
+
 import numpy as np
 import pytest
 from naive import mpp as naive
@@ -46,6 +48,15 @@ def test_without_openness_textures_are_rated_by_roughness_alone():
     assert alone[5, 0] > 0 > alone[16, 0]
 
 
+def test_the_openness_of_crowns_is_that_of_the_rough_windows():
+    counts = np.zeros((ROUGHNESS_BINS, OPENNESS_BINS), dtype=np.int64)
+    counts[4:8, 0], counts[15:18, 2], counts[15:18, 6] = 100_000, 100_000, 300_000
+    tally = np.stack([counts.ravel(), 600 * counts.ravel(), 360_000 * counts.ravel()], axis=1)
+    # The middles of the two bins are 2.5 and 6.5 eighths; pseudo-counts are a tenth of the cells.
+    assert estimate_background(tally, 0.5).crown_openness == pytest.approx((2.5 + 3 * 6.5) / 32, abs=0.05)
+    assert math.isnan(estimate_background(tally, 0.5, openness=False).crown_openness)
+
+
 @pytest.mark.parametrize("count", [1, 2, 3, 7])
 def test_classes_and_fitted_cells_are_those_of_the_evidence_for_any_number_of_threads(count):
     rng = np.random.default_rng(0)
@@ -75,7 +86,7 @@ def test_the_mean_evidence_is_that_of_the_high_cells_inside_without_the_height_i
     state = rng.choice([HIGH, LOW, VOID], (30, 40), p=[0.8, 0.1, 0.1])
     score = rng.integers(-3000, 3000, state.shape).astype(np.int16)
     height = rng.integers(250, 2500, state.shape).astype(np.uint16)
-    crowns = Background(8.0, 3.0, 0.3, 0.05, 0.4, (), 0)
+    crowns = Background(8.0, 3.0, 0.3, 0.05, 0.4, 0.8, (), 0)
     rectangles = np.array([[20.0, 15.0, 12.0, 7.0, 0.6], [2.0, 2.0, 9.0, 5.0, 2.0], [200.0, 15.0, 5.0, 5.0, 0.0]])
     found = mean_evidence(rectangles, height, state, score, crowns, WEIGHTS)
     density = np.log(np.exp(-0.5 * ((height / 100 - 8) / 3) ** 2) / (3 * np.sqrt(2 * np.pi)))

@@ -1,5 +1,7 @@
 """Blocks: what is built together is one footprint, along its cells."""
 
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -16,16 +18,18 @@ from roofbench.scenes.geodata.raster import Grid
 GRID = Grid.covering((0.0, 0.0, 60.0, 40.0), 0.5)
 
 
-def outlined(roofs, rectangles, crowns=(), crown_height=500):
-    """Outline blocks where boxes (x0, y0, x1, y1), metres, are roofs, 5 m high, or crowns."""
+def outlined(roofs, rectangles, crowns=(), crown_height=500, *, openness=0.0, crown_openness=0.8):
+    """Outline blocks where boxes (x0, y0, x1, y1), metres, are roofs, 5 m high, or rough as crowns."""
     state, score = np.full(GRID.shape, LOW), np.full(GRID.shape, -3000, np.int16)
-    height = np.zeros(GRID.shape, np.uint16)
-    for boxes, value, level in ((roofs, 3000, 500), (crowns, -2000, crown_height)):
+    height, passed = np.zeros(GRID.shape, np.uint16), np.zeros(GRID.shape, np.uint8)
+    for boxes, value, level, share in ((roofs, 3000, 500, 0.0), (crowns, -2000, crown_height, openness)):
         for x0, y0, x1, y1 in boxes:
             place = np.s_[80 - round(2 * y1) : 80 - round(2 * y0), round(2 * x0) : round(2 * x1)]
             state[place], score[place], height[place] = HIGH, value, level
+            passed[place] = round(255 * share)
     placed = [((x0 + x1), 80 - (y0 + y1), 2 * (x1 - x0), 2 * (y1 - y0), 0.0) for x0, y0, x1, y1 in rectangles]
-    return outline_blocks(np.array(placed, dtype=float).reshape(-1, 5), GRID, height, state, score)
+    rectangles = np.array(placed, dtype=float).reshape(-1, 5)
+    return outline_blocks(rectangles, GRID, height, state, score, passed, crown_openness=crown_openness)
 
 
 def likeness(one, two):
@@ -62,6 +66,21 @@ def test_a_crown_that_rises_above_two_houses_does_not_join_them():
     houses, crown = [(5, 5, 15, 20), (18, 5, 28, 20)], [(15, 5, 18, 20)]
     assert len(outlined(houses, houses, crowns=crown, crown_height=740)) == 1
     assert len(outlined(houses, houses, crowns=crown, crown_height=760)) == 2
+
+
+def test_a_crown_as_low_as_two_houses_does_not_join_them_where_pulses_pass_it_as_they_pass_crowns():
+    houses, crown = [(5, 5, 15, 20), (18, 5, 28, 20)], [(15, 5, 18, 20)]
+    assert len(outlined(houses, houses, crowns=crown, openness=0.50)) == 1
+    assert len(outlined(houses, houses, crowns=crown, openness=0.54)) == 2
+    # The limit follows the crowns of the scene: these are closed to most pulses.
+    assert len(outlined(houses, houses, crowns=crown, openness=0.28, crown_openness=0.4)) == 2
+    # Where openness says nothing, rough cells in a gap may be built.
+    assert len(outlined(houses, houses, crowns=crown, openness=0.62, crown_openness=math.nan)) == 1
+
+
+def test_an_open_rough_place_within_one_block_is_part_of_it():
+    block = [(5, 5, 15, 20), (18, 5, 28, 20), (15, 5, 18, 10)]
+    assert len(outlined(block, block, crowns=[(15, 10, 18, 20)], openness=1.0)[0].interiors) == 0
 
 
 def test_a_tall_rough_place_within_one_block_is_part_of_it():
