@@ -4,8 +4,8 @@ Run by hand: ``python tests/performance/study_crowns.py table --folders kentucky
 prints the values of the threshold of openness. Folders are scenes with a reference, as `roofbench scenes import` writes
 them. ``--without`` is the threshold that switches the rule off.
 
-Scenes are put together of pieces of one real scene, so that returns of roofs and crowns are measured ones: the points of
-single houses of 50 to 450 m2, two side by side on flat ground at a given distance, and the points of single trees in
+Scenes are put together of pieces of one real scene, so that returns of roofs and crowns are measured ones: the points
+of single houses of 50 to 450 m2, two side by side on flat ground at a given distance, and the points of single trees in
 the gap between them and elsewhere, ground under the crowns included. Trees in gaps keep their height or are scaled to
 a share of the lower ridge. Ground elsewhere is flat, with the scene's density. Pieces are chosen and turned at random.
 """
