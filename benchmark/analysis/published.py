@@ -78,11 +78,11 @@ def _row(
 
 
 #: Entries other than the default one. The references of 2013 are rectangles, one for each part of a building, so the
-#: default level of `mpp`, one footprint for each building, does not stand beside them.
+#: default level of `mpp`, one footprint for each building, does not stand beside them. The first is that of the suite.
 _ENTRIES = {
     "original": ("original", "original[mode=paper]", "original[mode=program]"),
     "improved": ("improved", "improved[mode=paper]", "improved[mode=program]"),
-    "mpp": ("mpp[level=part]", "mpp-printed"),
+    "mpp": ("mpp[least_height=2.5,level=part]", "mpp[level=part]", "mpp-printed"),
 }
 
 _OBJECT = "C_m C_r Q_l M_d D_o C_rd C_rr"

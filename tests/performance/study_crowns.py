@@ -1,8 +1,9 @@
 """Real crowns between real houses: the tables of docs/results/real-scenes.md on crowns that fill gaps.
 
 Run by hand: ``python tests/performance/study_crowns.py table --folders kentucky-s,ign-s,st-barth-s -d mpp``; ``choose``
-prints the values of the threshold of openness. Folders are scenes with a reference, as `roofbench scenes import` writes
-them. ``--without`` is the threshold that switches the rule off.
+prints the values of the threshold of openness, ``pictures`` draws docs/images/crowns.png of the first two folders.
+Folders are scenes with a reference, as `roofbench scenes import` writes them. ``--without`` is the threshold that
+switches the rule off.
 
 Scenes are put together of pieces of one real scene, so that returns of roofs and crowns are measured ones: the points
 of single houses of 50 to 450 m2, two side by side on flat ground at a given distance, and the points of single trees in
@@ -14,12 +15,12 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 import shapely
 from scipy import ndimage
-from study_real import blind, remembered, scored, set_to
+from study_real import IMAGES, blind, remembered, scored, set_to
 
 import roofbench as rb
 from roofbench.detectors.mpp import block_cells
@@ -264,16 +265,75 @@ def choose_value(options):
         print(f"without {left_out}: {best:g}")
 
 
+def pictures(options):
+    """Draw pairs of houses of two places with the footprints without and with the rule, over the heights."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    figure = Figure(figsize=(13, 4.0), layout="constrained")
+    panels = iter(figure.subplots(1, 4).ravel())
+    for folder in options.folders[:2]:
+        source = source_of(folder)
+        for pair, scene, found in islice(parted(source, options), 2):
+            panel = next(panels)
+            draw_pair(panel, scene, pair, found)
+            panel.set_title(f"pieces of {source.scene.name}", fontsize=9)
+    lines = [Line2D([], [], color=colour, linewidth=2) for colour in ("C2", "C3", "C0")]
+    figure.legend(
+        lines, ("reference", "without the rule", "with it"), loc="outside lower center", ncols=3, frameon=False
+    )
+    figure.savefig(IMAGES / "crowns.png", dpi=80)
+
+
+def parted(source, options):
+    """Yield the pairs that the rule takes apart."""
+    for seed in range(1, 10):
+        scene = scene_of(source, GAPS[0], 1.0, seed)
+        found = []
+        for value in (options.without, block_cells._AS_OPEN):
+            with set_to(block_cells, "_AS_OPEN", value):
+                found.append(rb.detect(scene, options.detectors[0]))
+        for pair in scene.reference.polygons.reshape(-1, 2):
+            if joined(found[0], pair) and not joined(found[1], pair):
+                yield pair, scene, found
+
+
+def joined(found, pair):
+    """Whether one footprint covers much of both houses."""
+    common = shapely.area(shapely.intersection(found.polygons[:, None], pair)) / shapely.area(pair)
+    return bool((common > 0.4).all(axis=1).any())
+
+
+def draw_pair(panel, scene, pair, found):
+    x, y = shapely.get_coordinates(shapely.union_all(pair).envelope.centroid)[0]
+    west, south, east, north = x - 20, y - 20, x + 20, y + 20
+    points = scene.points
+    near = (points.x > west) & (points.x < east) & (points.y > south) & (points.y < north)
+    panel.scatter(
+        points.x[near] - west, points.y[near] - south, c=points.z[near] - 100, s=2, cmap="Greys", vmin=0, vmax=9
+    )
+    for outlines, colour, width in (
+        (pair, "C2", 2.5),
+        (found[0].polygons, "C3", 2.0),
+        (found[1].polygons, "C0", 1.5),
+    ):
+        for polygon in shapely.get_parts(outlines):
+            if polygon.intersects(shapely.box(west, south, east, north)):
+                x, y = polygon.exterior.xy
+                panel.plot(np.array(x) - west, np.array(y) - south, color=colour, linewidth=width)
+    panel.set(xlim=(0, east - west), ylim=(0, north - south), xlabel="m", aspect="equal")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("study", choices=("table", "choose"))
+    parser.add_argument("study", choices=("table", "choose", "pictures"))
     parser.add_argument("--folders", required=True, type=lambda text: text.split(","), help="scene folders, by commas")
     parser.add_argument("-d", dest="detectors", action="append", help="detector [mpp]")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--without", type=float, default=99.0, help="threshold that switches the rule off [99]")
     options = parser.parse_args()
     options.detectors = options.detectors or ["mpp"]
-    {"table": table, "choose": choose_value}[options.study](options)
+    {"table": table, "choose": choose_value, "pictures": pictures}[options.study](options)
 
 
 if __name__ == "__main__":

@@ -47,6 +47,7 @@ IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 THRESHOLDS = {
     "low points, share of the least height": (preparation, "_LOW_SHARE", 0.9, (0.6, 0.7, 0.8, 0.9)),
     "rise of a crown above its roofs, cm": (block_cells, "_CROWN_RISE", 100_000, (100, 200, 250, 300, 100_000)),
+    "share of the openness of crowns": (block_cells, "_AS_OPEN", 99.0, (0.5, 0.65, 0.75, 0.85, 99.0)),
     "step between a roof and its rim, cm": (block_cells, "_RIM_STEP", -100_000, (-100_000, 30, 50, 100)),
     "width of gaps, m": (block_cells, "_NARROW", 0.01, (0.01, 3.0, 4.0, 5.0, 6.0)),
     "radius of the opening, m": (block_cells, "_OPENING", None, (0.5, 1.0, 1.5)),

@@ -1,6 +1,7 @@
 """The papers' rows, and what can be said of their tables."""
 
 from roofbench.benchmark.analysis.published import PUBLISHED, checks
+from roofbench.benchmark.suite import named_suite
 
 CHECKS = {(check.source, check.rule): check for check in checks()}
 
@@ -14,6 +15,11 @@ def test_every_row_names_a_detector_presets_and_a_source():
         assert row.detector in ("original", "improved", "mpp", "dempster-shafer")
         assert row.presets
         assert row.source[:4] in ("2010", "2011", "2013")
+
+
+def test_the_first_entry_beside_a_row_is_one_of_the_suite_of_the_papers():
+    labels = {entry.label for entry in named_suite("papers").detectors}
+    assert {row.entries[0] for row in PUBLISHED} <= labels
 
 
 def test_rows_of_another_evaluation_say_so():
