@@ -4,7 +4,8 @@ Run by hand: ``python tests/performance/study_leaderboard_page.py board/roofbenc
 Stored detections are evaluated here, so that no detector runs. Runs of other code than the installed one are left out;
 REVISION is that of the installed code. ``--programs STORE REVISION`` takes the runs of programs of others (`command`)
 from another store, made by roofbench as it was at a revision: they take hours and do not depend on the detectors here.
-It can be repeated; a run counts in the last store that has it.
+It can be repeated; a run counts in the last store that has it. ``--earlier PAGE`` takes the figures of programs from a
+page that this script wrote before, without a store.
 """
 
 from __future__ import annotations
@@ -104,11 +105,14 @@ def cell(values):
     return " / ".join(means)
 
 
-def table(found, states, columns, *, published):
-    """Return the lines of a table: a row for each detector, and beneath it what its paper prints."""
+def table(found, texts, columns, *, published):
+    """Return the lines of a table: a row for each detector, and beneath it what its paper prints.
+
+    `texts` stand, by label and column, where nothing was found.
+    """
     lines = ["| detector | " + " | ".join(columns) + " |", "|---|" + "--:|" * len(columns)]
     for label in DETECTORS:
-        cells = [cell(found[label][name]) if found[label][name] else states.get((label, name), "") for name in columns]
+        cells = [cell(found[label][name]) if found[label][name] else texts.get((label, name), "") for name in columns]
         lines.append(f"| `{label}` | " + " | ".join(cells) + " |")
     for detector in dict.fromkeys(row.detector for row in PUBLISHED) if published else ():
         cells = [printed(detector, AREAS[name]) for name in columns]
@@ -139,7 +143,29 @@ def without_result(rows):
     return states, lines
 
 
-def page(parts):
+class EarlierPage:
+    """What a page says of programs of others: their runs, and figures by matching, label and column."""
+
+    def __init__(self, text=""):
+        lines = text.splitlines()
+        self.runs = [line for line in lines if line.startswith("Programs of others:")]
+        self.sentences = [
+            line for line in lines if line.startswith("- ") and any(f"`{one}`" in line for one in PROGRAMS)
+        ]
+        self.figures = defaultdict(dict)
+        matching, columns = "", []
+        for line in lines:
+            if line.startswith("## Matching"):
+                matching = line.split("`")[1]
+            cells = [cell.strip() for cell in line.split("|")[1:-1]]
+            if cells[:1] == ["detector"]:
+                columns = cells[1:]
+            elif cells and cells[0].strip("`") in PROGRAMS:
+                label = cells[0].strip("`")
+                self.figures[matching] |= {(label, name): cell for name, cell in zip(columns, cells[1:], strict=True)}
+
+
+def page(parts, earlier):
     """Return the page of (store, rows, revision)."""
     rows = [row for _, some, _ in parts for row in some]
     states, sentences = without_result(rows)
@@ -147,8 +173,6 @@ def page(parts):
     for matching, found in by_matching.items():
         for store, some, _ in parts:
             add_qualities(found, store, some, matching)
-    good = sum(row.status == "ok" for row in rows)
-    made = "; ".join(f"{names_of(some)} at revision {revision}, {days_of(some)}" for _, some, revision in parts if some)
     lines = [
         "# One leaderboard",
         "",
@@ -156,23 +180,40 @@ def page(parts):
         "object quality / pixel quality, percent, means over the scenes of a column. Printed figures are of other",
         "data, the real places that the presets follow, so they allow a comparison and no more.",
         "",
-        f"{len(rows)} runs, {good} with a result: {made}.",
+        *sentences_of_runs(parts),
+        *earlier.runs,
         "`python tests/performance/study_leaderboard.py FOLDER -o board` runs them; the folder holds the real scenes.",
         "`tests/performance/study_leaderboard_page.py` writes this page. An empty cell was not run.",
     ]
     for matching, meaning in MATCHINGS.items():
-        found = by_matching[matching]
+        found, texts = by_matching[matching], earlier.figures[matching] | states
         lines += ["", f"## Matching `{matching}`: {meaning}", "", "Suite `papers`:", ""]
-        lines += table(found, states, list(AREAS), published=True)
+        lines += table(found, texts, list(AREAS), published=True)
         lines += ["", "Real scenes:", ""]
-        lines += table(found, states, list(REAL), published=False)
+        lines += table(found, texts, list(REAL), published=False)
+    sentences = sorted({*sentences, *earlier.sentences})
     lines += ["", "## Failures and skips", "", *(sentences or ["None."])]
     return "\n".join(lines) + "\n"
 
 
-def names_of(rows):
-    """Return what rows are of, in words."""
-    return "programs of others" if all(row.label in PROGRAMS for row in rows) else "detectors of roofbench"
+def sentences_of_runs(parts):
+    """Return how many runs there are of each kind, how many have a result, and of what code they are."""
+    made = {}
+    for _, rows, revision in parts:
+        for kind, some in kinds_of(rows):
+            total, good, of = made.get(kind, (0, 0, []))
+            known = sum(row.status == "ok" for row in some)
+            made[kind] = total + len(some), good + known, [*of, f"revision {revision}, {days_of(some)}"]
+    return [
+        f"{kind}: {total} runs, {good} with a result ({'; '.join(of)})." for kind, (total, good, of) in made.items()
+    ]
+
+
+def kinds_of(rows):
+    """Return what rows are of, in words, and the rows of each kind that has some."""
+    others = [row for row in rows if row.label in PROGRAMS]
+    own = [row for row in rows if row.label not in PROGRAMS]
+    return [pair for pair in (("Detectors of roofbench", own), ("Programs of others", others)) if pair[1]]
 
 
 def days_of(rows):
@@ -186,17 +227,19 @@ def main():
     parser.add_argument("store", type=Path)
     parser.add_argument("revision")
     parser.add_argument("--programs", nargs=2, action="append", default=[], metavar=("STORE", "REVISION"))
+    parser.add_argument("--earlier", type=Path, metavar="PAGE")
     options = parser.parse_args()
     with ExitStack() as stack:
         store = stack.enter_context(Store(options.store))
         rows = newest(store)
         parts = [(store, rows, options.revision)]
-        if options.programs:
+        if options.programs or options.earlier:
             others = [stack.enter_context(Store(Path(file))) for file, _ in options.programs]
             revisions = [revision for _, revision in options.programs]
             own = [row for row in rows if row.label not in PROGRAMS]
             parts = [(store, own, options.revision), *zip(others, newest_of_programs(others), revisions, strict=True)]
-        print(page(parts), end="")
+        earlier = EarlierPage(options.earlier.read_text(encoding="utf-8") if options.earlier else "")
+        print(page(parts, earlier), end="")
 
 
 if __name__ == "__main__":
