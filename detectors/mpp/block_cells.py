@@ -80,9 +80,7 @@ def built_cells(
     gaps = high & closed(core, 0.5 * _NARROW / gsd) & ~core
     if gaps.any():
         rising = height > _roofs_around(core & high, height, gsd).astype(np.int32) + _CROWN_RISE
-        gap, between = _between(gaps, _whole(core, sure, gsd))
-        crowns = _means(openness, gap, len(between)) >= 255 * _AS_OPEN * crown_openness
-        gaps &= ~((rising | crowns[gap]) & between[gap])
+        gaps[_crowns(gaps, _whole(core, sure, gsd), rising, openness, 255 * _AS_OPEN * crown_openness)] = False
     built = _whole(core | gaps, sure, gsd)
     built = _with_rims(built, height, high, max(round(_RIM / gsd), 1))
     _, labels = cv2.connectedComponents(built.astype(np.uint8), connectivity=4)
@@ -111,23 +109,23 @@ def _roofs_around(roof: Mask, height: NDArray[np.uint16], gsd: float) -> NDArray
     return closed_heights(np.where(roof, height, np.uint16(0)), 0.5 * _NARROW / gsd)
 
 
-def _between(gaps: Mask, apart: Mask) -> tuple[Labels, NDArray[np.bool_]]:
-    """Return the number of the gap of each cell, 0 outside gaps, and which gaps lie between two blocks of a mask."""
+def _crowns(
+    gaps: Mask, apart: Mask, rising: Mask, openness: States, least: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return row and column of the cells of crowns in gaps between two blocks of the mask `apart`.
+
+    These are cells that rise above the roofs on both sides, and all cells of a gap of at least some mean openness.
+    """
     row, column = np.nonzero(gaps)
-    blocks, gap = _components(apart), _components(gaps)[1:-1, 1:-1]
-    own = gap[row, column]
-    lowest, highest = _labels_beside(blocks, row, column)
-    least, most = np.full(own.max() + 1, np.iinfo(np.int32).max), np.zeros(own.max() + 1, np.int32)
-    np.minimum.at(least, own, lowest)
-    np.maximum.at(most, own, highest)
-    return gap, np.asarray(least < most)
-
-
-def _means(values: States, labels: Labels, count: int) -> NDArray[np.float64]:
-    """Return the mean of the values of each label, shape (count,)."""
-    cells = np.bincount(labels.ravel(), minlength=count)
-    total = np.bincount(labels.ravel(), weights=values.ravel(), minlength=count)
-    return np.asarray(total / np.maximum(cells, 1))
+    own = _components(gaps)[row + 1, column + 1]
+    lowest, highest = _labels_beside(_components(apart), row, column)
+    first, last = np.full(own.max() + 1, np.iinfo(np.int32).max), np.zeros(own.max() + 1, np.int32)
+    np.minimum.at(first, own, lowest)
+    np.maximum.at(last, own, highest)
+    cells = np.bincount(own)
+    as_open = np.bincount(own, weights=openness[row, column]) >= least * np.maximum(cells, 1)
+    crown = (first < last)[own] & (rising[row, column] | as_open[own])
+    return row[crown], column[crown]
 
 
 def _labels_beside(

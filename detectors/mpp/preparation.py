@@ -1,6 +1,6 @@
 """From the cloud to what the search reads: cells, classes, tables and boxes.
 
-The tables and their inputs set the peak memory, 39 bytes per cell; arrays are released as soon as they are no longer
+The tables and their inputs set the peak memory, 40 bytes per cell; arrays are released as soon as they are no longer
 needed.
 """
 
