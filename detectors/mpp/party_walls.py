@@ -3,8 +3,10 @@
 Nouns
 -----
 profile
-    Heights inside a rectangle on a lattice of `_LATTICE`, one row for each station along its longer side, one column
-    for each line across; NaN where the cell is not high. The outermost lines are left out: eaves and gutters.
+    Heights inside a rectangle on a lattice (`lattices`), one row for each station along its longer side, one column
+    for each line across; NaN where the cell is not high. The outermost lines are left out: eaves and gutters. Where
+    the roofs repeat obliquely to the row (`shears`), the lattice has that shear, provided that a wall along it is
+    certain and that the probable ones are `_SHARPER` times as strong as those perpendicular to the row.
 step
     Median over the lines of the height just behind a station less that just before it and less what the roof rises
     there anyway, which is the mean of its rise on both sides: a slope is no step. And the share of the lines that agree
@@ -36,35 +38,32 @@ from numpy.typing import NDArray
 from ...scenes.geodata.raster import Grid
 from .arrays import Floats, Rectangles
 from .cells import HIGH
-from .profiles import line_medians, station_means
+from .lattices import DECIMALS, SPACING, Lattice, lattice_of
+from .profiles import line_medians
 from .raised_walls import chimneys, parapet_strength, repeated, rises, series
-from .rectangles import corners
+from .shears import likely_shear
 from .wall_colours import Colours, colours_at
+from .wall_marks import Marks, colour_marks, roof_marks
 
 __all__ = [
     "CERTAIN",
     "PROBABLE",
-    "Marks",
     "Profile",
     "Wall",
     "WallRule",
-    "colour_marks",
     "colour_strength",
     "most_walls",
     "party_walls",
     "profile_of",
     "raised_strength",
-    "roof_marks",
     "wall_strength",
 ]
 
-#: Metres: spacing of the lattice, narrowest house, smallest depth of a rectangle with walls (the front or the rear half
-#: of a row often has one of its own), widest house of a row (median).
-_LATTICE, _NARROWEST, _SHALLOWEST, _WIDEST = 0.5, 4.0, 2.5, 12.0
-#: Stations that a mean reaches on either side, and that lie between a valley and its shoulders.
-_REACH, _SHOULDER = 2, 2
-#: Stations that the mean of colours reaches on either side: they are blurred by a pixel, and pixels are displaced.
-_COLOUR_REACH = 3
+#: Metres: narrowest house, smallest depth of a rectangle with walls (the front or the rear half of a row often has one
+#: of its own), widest house of a row (median).
+_NARROWEST, _SHALLOWEST, _WIDEST = 4.0, 2.5, 12.0
+#: How many times as strong oblique walls are as those perpendicular to the row.
+_SHARPER = 1.2
 #: Metres: deepest houses; on deeper roofs patches of membrane and gravel differ in colour, and plant rises.
 _DEEPEST = 16.0
 #: Share of the least colour edge that is noise, share of the lines that must have colours, and metres of a step that a
@@ -77,11 +76,6 @@ _CHIMNEY_METRES, _PITCHED, _PITCH = 0.3, 1.0, 0.27
 _STEP_NOISE, _VALLEY_NOISE = 0.12, 0.25
 #: Share of the lines that must have heights for a step, and for a valley.
 _KNOWN_STEP, _KNOWN_VALLEY = 0.6, 0.5
-
-#: Bits of the fractions of a cell that places of the lattice are rounded to.
-_FRACTION_BITS = 10
-#: Decimals of the sides of rectangles, metres.
-_DECIMALS = 6
 
 
 class WallRule(NamedTuple):
@@ -125,7 +119,7 @@ class Wall(NamedTuple):
 
 def most_walls(rectangles: Rectangles, grid: Grid) -> NDArray[np.int64]:
     """Return how many party walls there is room for in each rectangle, shape (n,): houses have a least width."""
-    sides = np.sort(np.round(np.asarray(rectangles).reshape(-1, 5)[:, 2:4] * grid.gsd, _DECIMALS), axis=1)
+    sides = np.sort(np.round(np.asarray(rectangles).reshape(-1, 5)[:, 2:4] * grid.gsd, DECIMALS), axis=1)
     room = np.floor(sides[:, 1] / _NARROWEST).astype(np.int64) - 1
     return np.where(sides[:, 0] < _SHALLOWEST, 0, np.maximum(room, 0))
 
@@ -135,12 +129,7 @@ class Profile(NamedTuple):
 
     Attributes
     ----------
-    place, along, across : ndarray, shape (2,)
-        The first corner, metres in the grid frame, and the directions along the row and across it, unit length.
-    length : float
-        Along the row, m.
-    stations : int
-        Along the row.
+    lattice : Lattice
     roof : tuple of Marks or None
         Steps and valleys, without what stands on the roofs.
     colours : Marks or None
@@ -150,11 +139,7 @@ class Profile(NamedTuple):
         Stations of the chimneys; None on a flat roof.
     """
 
-    place: Floats
-    along: Floats
-    across: Floats
-    length: float
-    stations: int
+    lattice: Lattice
     roof: tuple[Marks, Marks] | None
     colours: Marks | None
     rise: Floats | None
@@ -185,38 +170,48 @@ def profile_of(
     structures : ndarray of uint8, shape (rows, columns), optional
         Height of what stands on the roofs, cm.
     """
-    place = corners(rectangle)[0] * grid.gsd
-    first, second = place[1] - place[0], place[3] - place[0]
-    # Rounded, so that a side of exactly so many stations has as many in every window of a scene.
-    length, depth = (round(float(np.hypot(*side)), _DECIMALS) for side in (first, second))
-    if length < depth:
-        first, second, length, depth = second, first, depth, length
-    if length < 2 * _NARROWEST or depth < _SHALLOWEST:
+    lattice = lattice_of(rectangle, grid)
+    if lattice.length < 2 * _NARROWEST or lattice.depth < _SHALLOWEST:
         return None
-    u, v = first / length, second / depth
-    stations = np.arange(_LATTICE / 2, length, _LATTICE)
-    lines = np.arange(_LATTICE / 2, depth, _LATTICE)
-    x, y = ((place[0, k] + stations[:, None] * u[k] + lines * v[k]) / grid.gsd for k in (0, 1))
-    column = np.minimum(np.maximum(_cell_of(x), 0), grid.columns - 1)
-    row = np.minimum(np.maximum(_cell_of(y), 0), grid.rows - 1)
-    flat = row * state.shape[1] + column
-    high = state.take(flat) == HIGH
-    roof = np.where(high, height.take(flat) / 100.0, np.nan)
-    inner = np.s_[..., 1:-1]
-    edges = rise = stacks = None
-    around = colours() if depth <= _DEEPEST else None
-    if around is not None:
-        edges = colour_marks(np.where(high, colours_at(around, row, column), np.nan)[inner])
-    if depth <= _DEEPEST and structures is not None:
-        rise = rises(roof + structures.take(flat) / 100.0)
-        stacks = chimneys(rise) if _is_pitched(roof) else None
-    return Profile(place[0], u, v, length, len(stations), roof_marks(roof[inner]), edges, rise, stacks)
+
+    def read(lattice: Lattice, roof: Floats, row: NDArray[np.int64], column: NDArray[np.int64]) -> Profile:
+        inner = np.s_[..., 1:-1]
+        edges = rise = stacks = None
+        around = colours() if lattice.depth <= _DEEPEST else None
+        if around is not None:
+            shares = colours_at(around, row, column)
+            edges = colour_marks(np.where(np.isfinite(roof), shares, np.nan)[inner])
+        if lattice.depth <= _DEEPEST and structures is not None:
+            rise = rises(roof + structures[row, column] / 100.0)
+            stacks = chimneys(rise) if _is_pitched(roof) else None
+        return Profile(lattice, roof_marks(roof[inner]), edges, rise, stacks)
+
+    def roof_at(row: NDArray[np.int64], column: NDArray[np.int64], inside: NDArray[np.bool_]) -> Floats:
+        return np.where(inside & (state[row, column] == HIGH), height[row, column] / 100.0, np.nan)
+
+    row, column, inside = lattice.cells(grid)
+    roof = roof_at(row, column, inside)
+    straight = read(lattice, roof, row, column)
+    shear = likely_shear(roof[:, 1:-1]) if lattice.depth <= _DEEPEST else 0.0
+    if not shear:
+        return straight
+    lattice = lattice._replace(shear=shear)
+    row, column, inside = lattice.cells(grid)
+    oblique = read(lattice, roof_at(row, column, inside), row, column)
+    sharper = _total(oblique, PROBABLE) >= _SHARPER * _total(straight, PROBABLE)
+    return oblique if sharper and _total(oblique, CERTAIN) > 0 else straight
+
+
+def _total(profile: Profile, rule: WallRule) -> float:
+    """Return the strength of all walls together, m."""
+    strength = _strength(profile, rule)
+    return float(strength[_stations(profile, strength)].sum())
 
 
 def _is_pitched(roof: Floats) -> bool:
     section = line_medians(roof[:, 1:-1].T, np.nan)
     section = section[np.isfinite(section)]
-    least = max(_PITCHED, _PITCH * _LATTICE * roof.shape[1] / 2)
+    least = max(_PITCHED, _PITCH * SPACING * roof.shape[1] / 2)
     return len(section) > 0 and bool(np.ptp(section) >= least)
 
 
@@ -224,92 +219,32 @@ def party_walls(profile: Profile | None, rule: WallRule, grid: Grid) -> list[Wal
     """Return the party walls across the longer side of a rectangle, in order; none where houses would be wide."""
     if profile is None:
         return []
-    strength = np.zeros(profile.stations) if profile.roof is None else wall_strength(profile.roof, rule)
+    stations = _stations(profile, _strength(profile, rule))
+    found = [station * SPACING for station in sorted(stations)]
+    if not found or np.median(np.diff([0.0, *found, profile.lattice.length])) > _WIDEST:
+        return []
+    return [Wall(*profile.lattice.wall(at, grid)) for at in found]
+
+
+def _strength(profile: Profile, rule: WallRule) -> Floats:
+    """Return the evidence of all marks for a wall before each station, m, shape (stations,)."""
+    strength = np.zeros(profile.lattice.stations) if profile.roof is None else wall_strength(profile.roof, rule)
     if profile.colours is not None:
         strength += colour_strength(profile.colours, rule)
     if profile.rise is not None:
         strength += raised_strength(profile.rise, profile.chimneys, rule)
-    found: list[float] = []
+    return strength
+
+
+def _stations(profile: Profile, strength: Floats) -> list[int]:
+    """Return the stations of walls: the strongest first, apart from each other and from the ends."""
+    found: list[int] = []
     for station in np.argsort(-strength, kind="stable")[: np.count_nonzero(strength > 0)].tolist():
-        at = station * _LATTICE
-        inside = _NARROWEST <= at <= profile.length - _NARROWEST
-        if inside and all(abs(at - other) >= _NARROWEST for other in found):
-            found.append(at)
-    found.sort()
-    if not found or np.median(np.diff([0.0, *found, profile.length])) > _WIDEST:
-        return []
-    return [Wall((profile.place + at * profile.along) / grid.gsd, profile.across) for at in found]
-
-
-def _cell_of(place: Floats) -> NDArray[np.int64]:
-    """Return the cells of places in cells; on a border the same one whatever cell a window of the scene begins with."""
-    parts: NDArray[np.int64] = np.rint(place * 2**_FRACTION_BITS).astype(np.int64)
-    return parts >> _FRACTION_BITS
-
-
-class Marks(NamedTuple):
-    """A step, a valley or an edge of colour before each station, as far as it does not depend on a rule.
-
-    Attributes
-    ----------
-    values : ndarray, shape (stations, lines)
-        Its size in each line, in the direction of the median; NaN is unknown.
-    size : ndarray, shape (stations,)
-        Of the median.
-    known : ndarray of int64, shape (stations,)
-        Number of lines where it is known.
-    """
-
-    values: Floats
-    size: Floats
-    known: NDArray[np.int64]
-
-    def strength(self, least: float, share: float, noise: float, known: float) -> Floats:
-        """Return the size where it counts, shape (stations,), else 0.
-
-        A mark counts that is known in a share of the lines, has a least size, and exceeds the noise in another share of
-        the lines where it is known.
-        """
-        seen = (self.known / max(self.values.shape[1], 1) >= known) & (self.size >= least)
-        seen[seen] = (self.values[seen] > noise).sum(axis=1) / self.known[seen] >= share
-        return np.where(seen, self.size, 0.0)
-
-
-def roof_marks(profile: Floats) -> tuple[Marks, Marks] | None:
-    """Return the steps and the valleys of heights, shape (stations, lines); None where they are too few."""
-    count = len(profile)
-    if count < 2 * (_REACH + _SHOULDER):
-        return None
-    means = station_means(profile, _REACH)  # of stations i to i + _REACH - 1
-    before, behind = np.full_like(profile, np.nan), np.full_like(profile, np.nan)
-    before[_REACH:], behind[: len(means)] = means[: count - _REACH], means
-    step = behind - before - _slope(before, behind)
-    middle = line_medians(step)
-    steps = Marks(step * np.sign(middle)[:, None], np.abs(middle), np.isfinite(step).sum(axis=1))
-
-    low = np.full_like(profile, np.nan)
-    low[1:] = np.fmin(profile[1:], profile[:-1])
-    left, right = np.full_like(profile, np.nan), np.full_like(profile, np.nan)
-    far = _REACH + _SHOULDER
-    left[far:] = means[: count - far]
-    right[: len(means) - _SHOULDER] = means[_SHOULDER:]
-    valley = (left + right) / 2 - low
-    return steps, Marks(valley, line_medians(valley), np.isfinite(valley).sum(axis=1))
-
-
-def colour_marks(shares: Floats) -> Marks | None:
-    """Return the edges of colour in shares of red and blue, shape (2, stations, lines); None where there are none."""
-    _, count, lines = shares.shape
-    if count < 2 * _COLOUR_REACH or not np.isfinite(shares).any():
-        return None
-    edges = np.full((2, count, lines), np.nan)
-    for edge, share in zip(edges, shares, strict=True):
-        means = station_means(share, _COLOUR_REACH)
-        edge[_COLOUR_REACH : 1 - _COLOUR_REACH] = means[_COLOUR_REACH:] - means[:-_COLOUR_REACH]
-    middle = np.stack([line_medians(edge) for edge in edges])
-    size = np.hypot(*middle)
-    along = (edges * middle[:, :, None]).sum(axis=0) / np.maximum(size, 1e-12)[:, None]
-    return Marks(along, size, np.isfinite(along).sum(axis=1))
+        at = station * SPACING
+        inside = _NARROWEST <= at <= profile.lattice.length - _NARROWEST
+        if inside and all(abs(station - other) * SPACING >= _NARROWEST for other in found):
+            found.append(station)
+    return found
 
 
 def wall_strength(marks: tuple[Marks, Marks], rule: WallRule) -> Floats:
@@ -323,15 +258,6 @@ def colour_strength(marks: Marks, rule: WallRule) -> Floats:
     """Return the evidence of colours for a wall before each station, in metres of a step, shape (stations,)."""
     noise = _COLOUR_NOISE * rule.colour
     return _COLOUR_METRES * marks.strength(rule.colour, rule.colour_share, noise, _KNOWN_COLOUR)
-
-
-def _slope(before: Floats, behind: Floats) -> Floats:
-    """Return by how much a roof rises from just before a station to just behind it where no step is, m."""
-    rises = np.full((2, *before.shape), np.nan)
-    rises[0, _REACH:], rises[1, :-_REACH] = before[_REACH:] - before[:-_REACH], behind[_REACH:] - behind[:-_REACH]
-    known = np.isfinite(rises)
-    mean: Floats = np.where(known, rises, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return mean
 
 
 def raised_strength(rise: Floats, stacks: Floats | None, rule: WallRule) -> Floats:

@@ -98,6 +98,14 @@ class SceneParameters(Parameterised):
     row_gables: float = parameter(
         0.2, minimum=0, maximum=1, doc="share of rows in which each house turns its gable to the street"
     )
+    row_skew: float = parameter(
+        0.0,
+        unit="deg",
+        minimum=-35,
+        maximum=35,
+        doc="between the party walls of rows and the perpendicular of their street",
+        swept=(0, 10, 20, 30),
+    )
     row_chimneys: float = parameter(
         0.0,
         minimum=0,

@@ -23,7 +23,7 @@ def digitise(world: World, origin: tuple[float, float]) -> Footprints:
     """Return the reference footprints of a world, with roof heights as an attribute."""
     solids = world.solids
     rows = np.flatnonzero(solids.body == Body.BUILDING)
-    corners = _corners(solids.rectangle[rows])
+    corners = _corners(solids.rectangle[rows], solids.slant[rows])
     kept = entities(corners, solids.heights[rows], solids.owner[rows])
     corners, rows = corners[kept], rows[kept]
     if world.recipe.digitised == "image":
@@ -46,10 +46,11 @@ def digitise(world: World, origin: tuple[float, float]) -> Footprints:
     )
 
 
-def _corners(rectangles: np.ndarray) -> np.ndarray:
+def _corners(rectangles: np.ndarray, slant: np.ndarray) -> np.ndarray:
     x, y, angle, length, width = rectangles.T
     cosine, sine = np.cos(angle), np.sin(angle)
     a, b = np.stack([-length, length, length, -length], -1) / 2, np.stack([-width, -width, width, width], -1) / 2
+    a = a + slant[:, None] * b
     return np.stack(
         [x[:, None] + cosine[:, None] * a - sine[:, None] * b, y[:, None] + sine[:, None] * a + cosine[:, None] * b], -1
     )

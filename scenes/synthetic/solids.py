@@ -3,8 +3,9 @@
 Nouns
 -----
 solid
-    An upright prism over a rectangle, closed by up to four roof planes: a convex body of eight half-spaces
-    ``normal . (x, y, z) <= offset``. Faces 0-3 are the walls (ends of the length, then sides), 4-7 the roof.
+    An upright prism over a rectangle, or over a parallelogram whose ends are oblique, closed by up to four roof planes:
+    a convex body of eight half-spaces ``normal . (x, y, z) <= offset``. Faces 0-3 are the walls (ends of the length,
+    then sides), 4-7 the roof.
 roof kind
     flat; shed (one plane, rising across the width); gable (ridge along the length); hip (four planes).
 body kind
@@ -68,6 +69,9 @@ class Solid:
         Height of the walls above `base`.
     base : float
         Elevation of the floor; set when the ground is known.
+    slant : float
+        Tangent of the angle by which both ends of the length are oblique: the length begins and ends so much later a
+        metre across. The length itself and the area are the same.
     roof : Roof
     pitch : float
         Tangent of the roof's angle.
@@ -93,6 +97,7 @@ class Solid:
     wall: tuple[float, float, float, float] = (0.6, 0.58, 0.54, 0.5)
     texture: Texture = Texture.PLAIN
     base: float = 0.0
+    slant: float = 0.0
 
     @property
     def ridge(self) -> float:
@@ -111,7 +116,8 @@ class Solid:
         """Return the rectangle's corners, counter-clockwise, shape (4, 2), grown by `grow` metres each side."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         a, b = self.length / 2 + grow, self.width / 2 + grow
-        offsets = np.array([(-a, -b), (a, -b), (a, b), (-a, b)])
+        shift = self.slant * b
+        offsets = np.array([(-a - shift, -b), (a - shift, -b), (a + shift, b), (-a + shift, b)])
         corners: NDArray[np.float64] = offsets @ np.array([(cosine, sine), (-sine, cosine)]) + (self.x, self.y)
         return corners
 
@@ -125,6 +131,9 @@ class Solid:
             ((along, 1, self.length), (along, -1, self.length), (across, 1, self.width), (across, -1, self.width))
         ):
             normal = (sign * axis[0], sign * axis[1])
+            if self.slant and face < 2:
+                # Not of unit length, which no one needs of a wall.
+                normal = (normal[0] - sign * self.slant * across[0], normal[1] - sign * self.slant * across[1])
             planes[face] = (*normal, 0.0, normal[0] * self.x + normal[1] * self.y + half / 2)
         slopes: list[tuple[tuple[float, float], float, float]] = []  # axis, signed pitch, half extent
         if self.roof == Roof.FLAT:
@@ -152,6 +161,7 @@ class Solids:
     ----------
     rectangle : ndarray of float64, shape (n, 5)
         x, y, angle, length, width.
+    slant : ndarray of float64, shape (n,)
     planes : ndarray of float64, shape (n, 8, 4)
         Half-spaces, see the module.
     base, eave, ridge : ndarray of float64, shape (n,)
@@ -162,6 +172,7 @@ class Solids:
     """
 
     rectangle: NDArray[np.float64]
+    slant: NDArray[np.float64]
     planes: NDArray[np.float64]
     base: NDArray[np.float64]
     eave: NDArray[np.float64]
@@ -189,6 +200,7 @@ class Solids:
             rectangle=np.array(
                 [(item.x, item.y, item.angle, item.length, item.width) for item in items], dtype=np.float64
             ).reshape(-1, 5),
+            slant=column("slant", np.float64),
             planes=np.array([item.half_spaces() for item in items], dtype=np.float64).reshape(-1, 8, 4),
             base=base,
             eave=base + column("eave", np.float64),

@@ -44,7 +44,7 @@ def rasterise(world: World, grid: Grid, tile: NDArray[np.float32]) -> Surface:
     z = _bare(frame, Relief.of(terrain))
     label = np.zeros(grid.shape, dtype=np.int32)
     solids = world.solids
-    _raise_solids(z, label, frame, solids.rectangle, solids.planes, solids.body, tile)
+    _raise_solids(z, label, frame, solids.rectangle, solids.slant, solids.planes, solids.body, tile)
     _raise_blobs(z, label, frame, world.trees.blobs, tile)
     return Surface(grid, z, label)
 
@@ -66,6 +66,7 @@ def _raise_solids(
     label: NDArray[np.int32],
     frame: Frame,
     rectangle: NDArray[np.float64],
+    slant: NDArray[np.float64],
     planes: NDArray[np.float64],
     body: NDArray[np.uint8],
     tile: NDArray[np.float32],
@@ -76,8 +77,9 @@ def _raise_solids(
     for k in range(len(rectangle)):
         x0, y0, angle, length, width = rectangle[k]
         cosine, sine = np.cos(angle), np.sin(angle)
-        reach_x = (abs(cosine) * length + abs(sine) * width) / 2
-        reach_y = (abs(sine) * length + abs(cosine) * width) / 2
+        long = length + abs(slant[k]) * width
+        reach_x = (abs(cosine) * long + abs(sine) * width) / 2
+        reach_y = (abs(sine) * long + abs(cosine) * width) / 2
         first_row, last_row = int((north - y0 - reach_y) / gsd), int((north - y0 + reach_y) / gsd)
         first_column, last_column = int((x0 - reach_x - west) / gsd), int((x0 + reach_x - west) / gsd)
         rough = 0.22 if body[k] == _HEDGE else 0.0
@@ -86,7 +88,8 @@ def _raise_solids(
             for c in range(max(0, first_column), min(z.shape[1], last_column + 1)):
                 x = west + (c + 0.5) * gsd
                 dx, dy = x - x0, y - y0
-                if abs(cosine * dx + sine * dy) > length / 2 or abs(cosine * dy - sine * dx) > width / 2:
+                across = cosine * dy - sine * dx
+                if abs(cosine * dx + sine * dy - slant[k] * across) > length / 2 or abs(across) > width / 2:
                     continue
                 top, face = np.inf, 4
                 for f in range(4, 8):

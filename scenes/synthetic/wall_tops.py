@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from .palettes import BRICK
 from .parcels import Parcel
 from .recipe import SceneParameters
+from .row_houses import along_street, slanted
 from .solids import Body, Roof, Solid
 from .streams import Draws
 
@@ -51,11 +52,15 @@ def wall_tops(parcel: Parcel, recipe: SceneParameters, left: Solid, right: Solid
     """
     chimney, parapet = has_chimney(draws.unit(), recipe), draws.chance(recipe.row_parapets)
     first, second = _in_parcel(parcel, left, left.base - right.base), _in_parcel(parcel, right, 0.0)
-    at = second.a - second.wide / 2
+    skew = math.radians(recipe.row_skew)
+
+    def wall_at(b: float) -> float:
+        return second.a - second.wide / 2 + math.tan(skew) * (b - second.b)
+
     front, back = (
         end(first.b + sign * first.deep / 2, second.b + sign * second.deep / 2) for end, sign in ((max, -1), (min, 1))
     )
-    if abs(first.a + first.wide / 2 - at) > _APART or front >= back:
+    if abs(first.a + first.wide / 2 - wall_at(first.b)) > _APART or front >= back:
         return []
     look: dict[str, Any] = {"body": Body.ROOF_STRUCTURE, "colour": BRICK, "wall": BRICK}
     higher = first if left.ridge + first.lift > right.ridge else second
@@ -65,26 +70,26 @@ def wall_tops(parcel: Parcel, recipe: SceneParameters, left: Solid, right: Solid
     tops = []
     if parapet:
         eave = higher.solid.eave + higher.lift + rise
-        wall = parcel.place(at, higher.b, thick, higher.deep, eave=eave, **look)
-        if higher.solid.roof == Roof.GABLE and _along_street(parcel, higher.solid):
+        wall = parcel.place(wall_at(higher.b), higher.b, thick, higher.deep, eave=eave, **look)
+        if higher.solid.roof == Roof.GABLE and along_street(parcel, higher.solid):
             # A placed solid has its ridge along the longer side; this one runs along the street as that of the house.
             wall = wall.turned()
             wall.roof, wall.pitch = Roof.GABLE, higher.solid.pitch
-        tops.append(wall)
+        tops.append(slanted(parcel, wall, skew))
     if chimney:
         top = higher.solid.ridge + higher.lift + above
-        tops.append(parcel.place(at, middle, long, deep, eave=top, **look))
+        tops.append(parcel.place(wall_at(middle), middle, long, deep, eave=top, **look))
     return tops
-
-
-def _along_street(parcel: Parcel, house: Solid) -> bool:
-    """Return whether the ridge of a house runs along the street."""
-    return abs(math.sin(house.angle - parcel.angle)) < 0.5
 
 
 def _in_parcel(parcel: Parcel, house: Solid, lift: float) -> _House:
     """Return where a house stands on its parcel."""
     cosine, sine = math.cos(parcel.angle), math.sin(parcel.angle)
     dx, dy = house.x - parcel.x, house.y - parcel.y
-    wide, deep = (house.length, house.width) if _along_street(parcel, house) else (house.width, house.length)
+    if along_street(parcel, house):
+        wide, deep = house.length, house.width
+    else:
+        # Sides that are not perpendicular to the street are longer than the house is deep.
+        turned = abs(math.sin(house.angle - parcel.angle))
+        wide, deep = house.width / turned, house.length * turned
     return _House(house, cosine * dx + sine * dy, (cosine * dy - sine * dx) * parcel.facing, wide, deep, lift)

@@ -138,8 +138,9 @@ class CellIndex:
         """Index the solids."""
         solids = world.solids
         cosine, sine = np.abs(np.cos(solids.rectangle[:, 2])), np.abs(np.sin(solids.rectangle[:, 2]))
-        half_x = (solids.rectangle[:, 3] * cosine + solids.rectangle[:, 4] * sine) / 2
-        half_y = (solids.rectangle[:, 3] * sine + solids.rectangle[:, 4] * cosine) / 2
+        long = solids.rectangle[:, 3] + np.abs(solids.slant) * solids.rectangle[:, 4]
+        half_x = (long * cosine + solids.rectangle[:, 4] * sine) / 2
+        half_y = (long * sine + solids.rectangle[:, 4] * cosine) / 2
         x, y = solids.rectangle[:, 0], solids.rectangle[:, 1]
         boxes = np.stack([x - half_x, y - half_y, x + half_x, y + half_y], axis=-1)
         return cls.of(world.recipe, boxes, solids.ridge)

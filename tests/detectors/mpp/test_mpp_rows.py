@@ -13,17 +13,16 @@ from roofbench.detectors.mpp.cells import HIGH, LOW
 from roofbench.detectors.mpp.party_walls import (
     CERTAIN,
     PROBABLE,
-    colour_marks,
     colour_strength,
     most_walls,
     party_walls,
     profile_of,
-    roof_marks,
     wall_strength,
 )
 from roofbench.detectors.mpp.profiles import line_medians
 from roofbench.detectors.mpp.rectangles import to_world
 from roofbench.detectors.mpp.rows import find_levels
+from roofbench.detectors.mpp.wall_marks import colour_marks, roof_marks
 from roofbench.scenes.geodata.raster import Grid, Image
 
 GRID = Grid(1000.0, 2000.0, 0.5, 160, 260)

@@ -115,3 +115,44 @@ def test_ten_houses_with_annexes_are_a_row(seed):
     town = preset("rows-small", row_share=1.0, outbuildings=2.0, row_house_width=4.0, buildings=30)
     solids = make_world(town, seed).solids
     assert len(np.unique(solids.owner[solids.body == Body.BUILDING])) == 30
+
+
+def directions(house):
+    """Directions of the sides of an outline, degrees."""
+    x, y = np.diff(shapely.get_coordinates(house), axis=0).T
+    return np.degrees(np.arctan2(y, x)) % 180
+
+
+@pytest.mark.parametrize("gables", [0.0, 1.0])
+@pytest.mark.parametrize("skew", [-30.0, 15.0])
+def test_a_skew_turns_party_walls_but_neither_fronts_nor_areas(gables, skew):
+    more = ROW | {"row_gables": gables, "row_variety": 0.0, "winding": 0.0, "orientation_spread": 0.0}
+    plain, oblique = (rb.make_scene("rows-small", seed=3, row_skew=value, **more, **EXACT) for value in (0.0, skew))
+    areas = [shapely.area(scene.reference.polygons) for scene in (plain, oblique)]
+    assert len(areas[1]) == len(areas[0])
+    # At the border of the scene other houses may be left out.
+    assert np.abs(areas[1][:, None] - areas[0]).min(axis=1).max() < 0.05
+    plain_sides, sides = (
+        np.stack([directions(house) for house in scene.reference.polygons]) for scene in (plain, oblique)
+    )
+    street = np.median(plain_sides.min(axis=1))
+    along = np.abs((sides - street + 45) % 90 - 45) < 0.1
+    assert (along.sum(axis=1) == 2).all()
+    np.testing.assert_allclose(np.abs((sides[~along] - street + 45) % 90 - 45), abs(skew), atol=0.2)
+    # Houses still stand wall to wall and none overlap.
+    one, two = shapely.STRtree(oblique.reference.polygons).query(oblique.reference.polygons, predicate="overlaps")
+    common = shapely.area(shapely.intersection(oblique.reference.polygons[one], oblique.reference.polygons[two]))
+    assert common.max(initial=0) < 0.1
+
+
+@pytest.mark.parametrize("gables", [0.0, 1.0])
+def test_points_on_oblique_houses_lie_inside_their_outlines(gables):
+    more = ROW | {"row_gables": gables, "row_variety": 0.0, "tree_density": 0.0, "gap_trees": 0.0, "clutter": 0.0}
+    scene = rb.make_scene("rows-small", seed=3, row_skew=30.0, horizontal_noise=0.0, **more, **EXACT)
+    points = scene.points
+    high = points.z - scene.dem.sample(points.x, points.y) > 3.0
+    united = shapely.union_all(scene.reference.polygons)
+    inside = shapely.contains_xy(shapely.buffer(united, 0.1), points.x, points.y)
+    assert inside[high].mean() > 0.97
+    within = shapely.contains_xy(shapely.buffer(united, -0.3), points.x, points.y)
+    assert high[within].mean() > 0.97
