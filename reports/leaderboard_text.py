@@ -223,6 +223,7 @@ def leaderboards_text(boards: Sequence[Leaderboard], form: Literal["csv", "md", 
             "scenes": list(board.scenes),
             "entries": leaderboard_data(board).to_records(),
             "by_scene": board.by_scene,
+            "cues": {label: {cue: scenes for cue, scenes in own.items() if cue} for label, own in board.cues.items()},
             "notes": list(board.notes),
             "unsuccessful": [vars(run) for run in board.unsuccessful],
         }

@@ -325,7 +325,7 @@ class Scene(Displayed):
 
         if (cloud := self.points) is not None:
             add(cloud.x, cloud.y, cloud.z, cloud.return_number, cloud.number_of_returns)
-            add(cloud.intensity, cloud.classification, cloud.colour)
+            add(cloud.intensity, cloud.classification, cloud.colour, cloud.source)
         if (image := self.image) is not None:
             digest.update(repr((image.bands, image.grid)).encode())
             add(image.values, image.valid)

@@ -30,6 +30,7 @@ from .inference import (
     scenes_needed,
 )
 from .results import Cell, Entry, Leaderboard, UnsuccessfulRun
+from .used_cues import cue_notes, used_cues
 from .versions import comparable_runs, version_names
 
 __all__ = ["make_leaderboard", "repeat_command", "unsuccessful_runs"]
@@ -101,6 +102,7 @@ def make_leaderboard(
         same = place > 0 and order(boards[place - 1]) == order(board)
         rank = None if not measured else entries[-1].rank if same else place + 1
         entries += board.entries(indices, rank=rank, group=groups.get(board.label, ""))
+    cues = used_cues(rows, store)
     notes = [
         *versions,
         *skipping,
@@ -108,6 +110,7 @@ def make_leaderboard(
         *_stability(complete, ranking),
         *_notes(boards, scenes),
         *(f"{scene} has no reference and is left out" for scene in bare),
+        *cue_notes(cues),
         *_estimates(rows, store),
     ]
     return Leaderboard(
@@ -119,6 +122,7 @@ def make_leaderboard(
         entries=tuple(entries),
         scenes=scenes,
         by_scene=_by_scene(rows, evaluations, ranking),
+        cues=cues,
         notes=tuple(notes),
         unsuccessful=(*unsuccessful_runs(rows), *_unevaluated(rows, keyed, failures)),
     )

@@ -17,7 +17,7 @@ Values are fractions, metres, seconds and bytes; None where undefined. `reports`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 from ...evaluators.base import Index
@@ -139,6 +139,9 @@ class Leaderboard:
     by_scene : mapping of str to mapping of str to float
         Scene, also of those that are left out of `scenes`, to detector label to the mean over seeds of the index that
         ranks; None where that is undefined, absent where the detector has no result.
+    cues : mapping of str to mapping of str to tuple of str
+        Detector label to cue to the scenes on which it carried information and was used; under ``""`` the scenes on
+        which the detector named its cues. Detectors that name none are absent.
     notes : tuple of str
     unsuccessful : tuple of UnsuccessfulRun
         Failures, then skips.
@@ -152,6 +155,7 @@ class Leaderboard:
     entries: tuple[Entry, ...]
     scenes: tuple[str, ...]
     by_scene: Mapping[str, Mapping[str, float | None]]
+    cues: Mapping[str, Mapping[str, tuple[str, ...]]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     unsuccessful: tuple[UnsuccessfulRun, ...] = ()
 

@@ -256,7 +256,9 @@ def _joined_city(scene: Scene, detector: Declaration, task: Task) -> tuple[Footp
         raise MissingInputError(next(iter(survey.skipped.values())))
     parts = dict(stored_parts(files))
     found, _ = join_tiles(parts, crs=scene.crs, numbers=detector.numbers, source=detector.name)
-    metadata = {"notes": list(survey.notes)} if survey.notes else {}
+    cues = dict.fromkeys(cue for used in survey.cues for cue in used.split(", "))
+    facts = {"cues": list(cues), "notes": list(survey.notes)}
+    metadata = {name: texts for name, texts in facts.items() if texts}
     return dataclasses.replace(found, metadata=metadata), survey.cost
 
 

@@ -310,11 +310,19 @@ class StoreReader:
 
     def run_notes(self, run_ids: Iterable[int]) -> dict[int, tuple[str, ...]]:
         """Return what these runs estimated for lack of data, one sentence each; runs without notes are absent."""
-        wanted = set(run_ids)
-        query = """SELECT id, json_extract(metadata, '$.notes') AS notes FROM runs
-            WHERE metadata LIKE '%"notes"%' AND json_type(metadata, '$.notes') = 'array'"""
-        rows = self._db.execute(query)
-        return {int(row["id"]): tuple(self._json(row["notes"], "notes")) for row in rows if row["id"] in wanted}
+        return self._listed("notes", run_ids)
+
+    def run_cues(self, run_ids: Iterable[int]) -> dict[int, tuple[str, ...]]:
+        """Return the names of the cues that these runs used; runs of detectors that name none are absent."""
+        return self._listed("cues", run_ids)
+
+    def _listed(self, name: str, run_ids: Iterable[int]) -> dict[int, tuple[str, ...]]:
+        """Return a list of texts among the metadata of runs; runs without it are absent."""
+        wanted, path = set(run_ids), f"$.{name}"
+        query = """SELECT id, json_extract(metadata, ?) AS texts FROM runs
+            WHERE metadata LIKE ? AND json_type(metadata, ?) = 'array'"""
+        rows = self._db.execute(query, (path, f'%"{name}"%', path))
+        return {int(row["id"]): tuple(map(str, self._json(row["texts"], name))) for row in rows if row["id"] in wanted}
 
 
 def _chunks(items: list[str], size: int = 500) -> Iterator[list[str]]:

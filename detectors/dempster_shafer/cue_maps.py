@@ -6,7 +6,8 @@ surface
     Mean height of the last returns above ground per cell, metres; cells without points take the nearest value.
 pulse difference
     Highest first return minus lowest last return of a cell and its neighbours that lie high, metres: large in crowns.
-    Walls also part the pulses, so that the smallest difference of the windows around a cell counts.
+    Walls also part the pulses, so that the smallest difference of the windows around a cell counts. Points whose return
+    numbers are unknown count as first and as last returns: pulses that pass through a crown end at all heights in it.
 strength, directedness
     Of the changes of the surface normal, by the structure tensor N of the slopes: strength R = sqrt(trace N), 1/m;
     directedness D = 4 det N / (trace N)^2: 0 where the slope changes in one direction (a ridge, an edge), 1 where it
@@ -44,7 +45,9 @@ class CueMaps:
     height : ndarray
         The surface: height above ground, metres.
     pulse_difference : ndarray or None
-        Metres; None when no pulse has several returns, or the numbers name no first or last return in most cells.
+        Metres.
+    numbered : bool
+        Whether the return numbers of a part of the points are known.
     vegetation : ndarray or None
         Vegetation index of the image.
     strength, directedness : ndarray
@@ -53,6 +56,7 @@ class CueMaps:
     grid: Grid
     height: _Floats
     pulse_difference: _Floats | None
+    numbered: bool
     vegetation: _Floats | None
     strength: _Floats
     directedness: _Floats
@@ -76,19 +80,17 @@ def cue_maps(
     """
     index, inside = grid.cells(points.x, points.y)
     used = inside & np.isfinite(heights)
-    first, last, several = _first_and_last(points, used, index, grid)
+    first, last, numbered = _first_and_last(points, used, index, grid)
     surface, known = _mean(index[last], heights[last], grid)
     surface = _nearest_filled(surface, known)
-    difference = None
-    if several:
-        highest = _extreme(index[first], heights[first], grid, np.maximum)
-        lowest = _extreme(index[last], heights[last], grid, np.minimum)
-        difference = _least_around(highest - lowest)
+    highest = _extreme(index[first], heights[first], grid, np.maximum)
+    lowest = _extreme(index[last], heights[last], grid, np.minimum)
     strength, directedness = _texture(surface, grid.gsd, window)
     return CueMaps(
         grid=grid,
         height=surface,
-        pulse_difference=difference,
+        pulse_difference=_least_around(highest - lowest),
+        numbered=numbered,
         vegetation=vegetation,
         strength=strength,
         directedness=directedness,
@@ -98,19 +100,21 @@ def cue_maps(
 def _first_and_last(
     points: PointCloud, used: NDArray[np.bool_], index: NDArray[np.intp], grid: Grid
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], bool]:
-    """Return which points are first and last returns, and whether they differ; all of them where they are not known.
+    """Return which points are first and last returns, and whether that is known of any; both where it is not known.
 
     Some files write the same numbers at every point, none of which is that of a last return.
     """
     number, total = points.return_number, points.number_of_returns
     if number is None or total is None or not (total > 1).any():
         return used, used, False
-    first, last = used & (number == 1), used & (number == total)
+    known = used & (total > 0)
+    first, last = known & (number == 1), known & (number == total)
     size = grid.rows * grid.columns
-    covered, *numbered = (np.count_nonzero(np.bincount(index[part], minlength=size)) for part in (used, first, last))
+    covered, *numbered = (np.count_nonzero(np.bincount(index[part], minlength=size)) for part in (known, first, last))
     if min(numbered) < _LEAST_NUMBERED * covered:
         return used, used, False
-    return first, last, True
+    unknown = used & ~known
+    return first | unknown, last | unknown, True
 
 
 def _mean(index: NDArray[np.intp], values: NDArray[np.float32], grid: Grid) -> tuple[_Floats, NDArray[np.bool_]]:

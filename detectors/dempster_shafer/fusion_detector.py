@@ -30,11 +30,11 @@ from ...core.parameters import parameter
 from ...scenes.geodata.density import point_spacing
 from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.outlines import coverage_of_mask, trace
-from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..shared.cue_information import ANCHOR, CueInformation, informative_cues
+from ..shared.known_returns import known_returns
 from ..shared.morphology import opened, without_holes
 from ..shared.pixel_cues import greenness
 from ..shared.regularise import regularise
@@ -71,6 +71,8 @@ _SPEAKS_FOR = {
     "undirected share": TREE,
 }
 _SOURCE = "Rottensteiner 2005"
+#: Names of the pulse difference with return numbers and without any.
+_DIFFERENCE, _RANGE = "pulse difference", "range of heights"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,13 +171,14 @@ class DempsterShafer(Detector):
         scene.require(self.requires)
         scene = scene.for_detection()
         assert scene.points is not None
-        points = scene.points.distinct()
+        known = known_returns(scene.points.distinct(), scene.extent)
+        points = known.points
         grid = Grid.covering(scene.extent, self.cell or _default_cell(scene))
         index = None if scene.image is None else greenness(scene.image, grid, darkest=self.darkest)
         near_infrared = scene.image is not None and "nir" in scene.image.bands
         cues = cue_maps(points, scene.heights.above(points), grid, window=self.window, vegetation=index)
         probabilities = self._probabilities(cues, near_infrared)
-        information = self._information(probabilities, _unnumbered(points, cues))
+        information = self._information(probabilities, cues.numbered).with_notes(known.notes)
         if information.silent:
             cues = _without(cues, information.silent)
             probabilities = self._probabilities(cues, near_infrared)
@@ -212,16 +215,17 @@ class DempsterShafer(Detector):
             ),
         )
 
-    def _information(self, probabilities: dict[str, _Floats], known_silent: Mapping[str, str]) -> CueInformation:
+    def _information(self, probabilities: dict[str, _Floats], numbered: bool) -> CueInformation:
         """Return which cues separate roofs from trees among the high cells; the strength of texture is the anchor."""
-        names = {"strength": ANCHOR, "pulse difference": "pulse difference", "vegetation": "vegetation"}
+        difference = _DIFFERENCE if numbered else _RANGE
+        names = {"strength": ANCHOR, "pulse difference": difference, "vegetation": "vegetation"}
         # Steps are wide: which side of the middle a probability is on separates more than the probability itself.
         ratings = {
             name: np.sign(probabilities[cue] - np.float32(0.5)) for cue, name in names.items() if cue in probabilities
         }
         # Texture is a poor expert here: walls are as rough as crowns, and where trees are few it would refute colours.
         high = probabilities["height"] > 0.5
-        return informative_cues(ratings, high, independent=("vegetation",), known_silent=known_silent)
+        return informative_cues(ratings, high, independent=("vegetation",))
 
     def _step(self, values: NDArray[np.floating] | None, name: str) -> _Floats | None:
         """Return the probability of a cue by the bounds of that name."""
@@ -290,14 +294,6 @@ class DempsterShafer(Detector):
         )
 
 
-def _unnumbered(points: PointCloud, cues: CueMaps) -> dict[str, str]:
-    """Return why there is no pulse difference although pulses have several returns; empty where there is one."""
-    total = points.number_of_returns
-    if cues.pulse_difference is not None or total is None or not (total > 1).any():
-        return {}
-    return {"pulse difference": "most cells have no first or no last return"}
-
-
 def _evidence(probabilities: Mapping[str, _Floats]) -> list[Evidence]:
     return [evidence_for(_SPEAKS_FOR[name], value) for name, value in probabilities.items()]
 
@@ -324,7 +320,7 @@ def _without(cues: CueMaps, silent: Collection[str]) -> CueMaps:
     """Return cue maps without those of silent cues."""
     return replace(
         cues,
-        pulse_difference=None if "pulse difference" in silent else cues.pulse_difference,
+        pulse_difference=None if {_DIFFERENCE, _RANGE} & set(silent) else cues.pulse_difference,
         vegetation=None if "vegetation" in silent else cues.vegetation,
     )
 

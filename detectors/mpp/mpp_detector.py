@@ -21,6 +21,7 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.scene import Scene
 from ..base import Detector
 from ..shared.cue_information import PENETRATION
+from ..shared.known_returns import known_returns
 from ..steps import Step
 from .annealing import join_traces
 from .arrays import Mask, Rectangles
@@ -130,10 +131,11 @@ class MPP(MPPParameters, Detector):
         seen = scene.for_detection()
         seen.require(self.requires)
         began = time.perf_counter()
-        points = seen.points
-        assert points is not None
-        if not has_points(points.z):
+        assert seen.points is not None
+        if not has_points(seen.points.z):
             return Footprints.empty(crs=scene.crs, source=self.name), None
+        known = known_returns(seen.points, seen.extent)
+        points = known.points
         with started_threads(self.threads) as threads:
             prepared = prepare(self, points, seen, threads)
             ready = time.perf_counter()
@@ -150,7 +152,7 @@ class MPP(MPPParameters, Detector):
                 if field.name != "evidence"
             },
             "cues": list(prepared.cues.used),
-            "notes": list(prepared.cues.notes),
+            "notes": list(prepared.cues.with_notes(known.notes).notes),
             "boxes": len(prepared.boxes),
             "energy": total_energy(prepared, rectangles, energies),
             "seconds": {"preparation": ready - began, "search": done - ready},

@@ -19,6 +19,7 @@ from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
 from ...scenes.scene import Scene
 from ..shared.cue_information import IMAGE, PENETRATION, CueInformation
+from ..shared.known_returns import known_returns
 from .arrays import Heights, Integers, Mask, Rectangles, Scores, States
 from .background import Background, estimate_background, tally_textures
 from .candidates import Boxes, propose_boxes
@@ -247,8 +248,8 @@ def _of_whole(scene: Scene, name: str, counted: Integers) -> Integers:
 
 def survey_textures(parameters: MPPParameters, scene: Scene) -> dict[str, Any]:
     """Return the textures in the core of a scene, counted with and without the number of returns, and of the image."""
-    points = scene.points
-    assert points is not None
+    assert scene.points is not None
+    points = known_returns(scene.points, scene.extent).points
     cell = parameters.cell or cell_size(points.x, points.y, scene.extent)
     grid, ground = Grid.covering(scene.extent, cell), scene.heights.ground
     found: dict[str, Any] = {}

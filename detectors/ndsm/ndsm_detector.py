@@ -33,6 +33,7 @@ from ...scenes.scene import Scene
 from ..base import Detector
 from ..shared.cue_information import ANCHOR, IMAGE, PENETRATION, CueInformation, informative_cues, silent_on_rasters
 from ..shared.cues import CellCues, cell_cues, rated
+from ..shared.known_returns import known_returns
 from ..shared.morphology import opened, without_holes
 from ..shared.pixel_cues import DARKEST, LEAST_GREEN_RED, LEAST_NDVI, greenness
 from ..shared.regularise import regularise
@@ -152,7 +153,8 @@ class NDSM(Detector):
         scene = scene.for_detection()
         assert scene.points is not None
         # Duplicate points would count as evidence for a plane.
-        points = scene.points.distinct()
+        known = known_returns(scene.points.distinct(), scene.extent)
+        points = known.points
         heights = self._ground(scene).above(points)
         grid = Grid.covering(scene.extent, self.cell or default_cell(points, heights, scene.extent))
         cues = cell_cues(points, heights, grid, threshold=self.height, window=self.window)
@@ -172,7 +174,7 @@ class NDSM(Detector):
             roof=roof,
             mask=mask,
             traced=traced,
-            footprints=self._footprints(traced, mask, cues, likeness, scene.crs, information),
+            footprints=self._footprints(traced, mask, cues, likeness, scene.crs, information.with_notes(known.notes)),
         )
 
     def measured(self, scene: Scene) -> Mapping[str, float]:

@@ -19,8 +19,8 @@ where the caller knows that nothing can be below a point (a raster has one heigh
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,15 +56,22 @@ class CueInformation:
     used : tuple of str
     silent : mapping of str to str
         Reason by cue.
+    places : tuple of str
+        Sentences on cues that are used in a part of the scene only.
     """
 
     used: tuple[str, ...]
     silent: Mapping[str, str]
+    places: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """One sentence for each silent cue."""
-        return tuple(f"the cue {name!r} is not used: {reason}" for name, reason in self.silent.items())
+        """One sentence for each silent cue, and those on parts of the scene."""
+        return *(f"the cue {name!r} is not used: {reason}" for name, reason in self.silent.items()), *self.places
+
+    def with_notes(self, places: Iterable[str]) -> CueInformation:
+        """Return the same with sentences on parts of the scene."""
+        return replace(self, places=(*self.places, *places))
 
 
 def silent_on_rasters(x: NDArray[np.float64], y: NDArray[np.float64]) -> dict[str, str]:

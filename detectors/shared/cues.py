@@ -8,7 +8,8 @@ high share
     High points among all points of a cell: the share of the cell that a high object covers, 1 over a roof. Pulses pass
     through a crown, so its share is lower: the complement is the *penetration*.
 multiple share
-    High points whose pulse gave several returns, among the high points around: 0 on a roof, 1 in a crown.
+    High points whose pulse gave several returns, among the high points around whose number of returns is known (not 0):
+    0 on a roof, 1 in a crown.
 roughness
     Standard deviation, metres, of the high points of a window about their plane; each cell has the smallest value of
     the windows that contain it, so that ridges, eaves and steps between roofs are smooth.
@@ -64,7 +65,7 @@ class CellCues:
     penetration : ndarray
         1 - high share over 3 x 3 cells.
     multiple_share : ndarray or None
-        Over 3 x 3 cells; None when the points have no number of returns, or one each.
+        Over 3 x 3 cells, NaN where no number of returns is known; None when no point has several.
     roughness : ndarray
         Metres; NaN where too few points are high.
     height : ndarray
@@ -103,8 +104,8 @@ def cell_cues(
     index, inside = grid.cells(points.x, points.y)
     returns = points.number_of_returns
     found = _tally(index, inside, heights, _NO_RETURNS if returns is None else returns, threshold, grid.shape)
-    count, n_high, multiple, sums, high, low, several = found
-    multiple_share = _share(_box(multiple), _box(n_high)) if several else None
+    count, n_high, multiple, unknown, sums, high, low, several = found
+    multiple_share = _share(_box(multiple), _box(n_high - unknown)) if several else None
     smoothest = _smoothest_plane(points, index, high, grid, max(2, round(window / grid.gsd)))
     shared = _share(_box(n_high), _box(count))
     return CellCues(
@@ -127,15 +128,16 @@ def _tally(
     returns: NDArray[np.uint8],
     threshold: float,
     shape: tuple[int, int],
-) -> tuple[_Floats, _Floats, _Floats, NDArray[np.float64], NDArray[np.intp], NDArray[np.intp], bool]:
-    """Tally points in their cells; `returns` is empty where the number of returns is not known.
+) -> tuple[_Floats, _Floats, _Floats, _Floats, NDArray[np.float64], NDArray[np.intp], NDArray[np.intp], bool]:
+    """Tally points in their cells; `returns` is empty where the number of returns is not known of any, 0 of one.
 
-    Returns per cell the number of points, of high points and of high points of several returns, and the sum of the
-    heights of high points; the rows of the high and of the low points; and whether any point has several returns.
+    Returns per cell the number of points, of high points, of high points of several and of an unknown number of
+    returns, and the sum of the heights of high points; the rows of the high and of the low points; and whether any
+    point has several returns.
     """
     size = shape[0] * shape[1]
     count, n_high = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.float32)
-    multiple, sums = np.zeros(size, dtype=np.float32), np.zeros(size)
+    multiple, unknown, sums = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.float32), np.zeros(size)
     high, low = np.empty(len(heights), dtype=np.intp), np.empty(len(heights), dtype=np.intp)
     many, few, several = 0, 0, False
     least = np.float32(threshold)
@@ -150,13 +152,14 @@ def _tally(
             n_high[cell] += 1
             sums[cell] += heights[i]
             multiple[cell] += is_multiple
+            unknown[cell] += len(returns) > 0 and returns[i] == 0
             high[many] = i
             many += 1
         if heights[i] < _GROUND:
             low[few] = i
             few += 1
-    on_grid = count.reshape(shape), n_high.reshape(shape), multiple.reshape(shape), sums.reshape(shape)
-    return (*on_grid, high[:many], low[:few], several)
+    on_grid = count.reshape(shape), n_high.reshape(shape), multiple.reshape(shape), unknown.reshape(shape)
+    return (*on_grid, sums.reshape(shape), high[:many], low[:few], several)
 
 
 def _noise(points: PointCloud, heights: NDArray[np.float32], low: NDArray[np.intp], grid: Grid) -> float:

@@ -46,6 +46,14 @@ __all__ = ["LasHeader", "read_chunks", "read_las_header", "read_points", "write_
 
 #: Name under which point files are written.
 _SOFTWARE = "roofbench"
+#: Dimensions of LAS by the names of the columns of a cloud.
+_DIMENSIONS = {
+    "return_number": "return_number",
+    "number_of_returns": "number_of_returns",
+    "intensity": "intensity",
+    "classification": "classification",
+    "source": "point_source_id",
+}
 #: Largest coordinate, metres; beyond it a header is broken.
 _LARGEST = 1e9
 #: Points unpacked at a time; about 100 MB with the scaled coordinates.
@@ -227,10 +235,10 @@ def write_points(cloud: PointCloud, path: str | os.PathLike[str], *, crs: str | 
             part = cloud.take(slice(start, start + CHUNK))
             record = laspy.ScaleAwarePointRecord.zeros(len(part), header=header)
             record.x, record.y, record.z = part.x, part.y, part.z
-            for name in ("return_number", "number_of_returns", "intensity", "classification"):
+            for name, dimension in _DIMENSIONS.items():
                 column = getattr(part, name)
                 if column is not None:
-                    record[name] = column
+                    record[dimension] = column
             if part.colour is not None:
                 for band, name in enumerate(("red", "green", "blue", "nir")[: part.colour.shape[1]]):
                     record[name] = part.colour[:, band]
@@ -251,6 +259,7 @@ class _Columns:
             "number_of_returns": np.empty(total, dtype=np.uint8),
             "classification": np.empty(total, dtype=np.uint8),
             "intensity": np.empty(total, dtype=np.uint16),
+            "source": np.empty(total, dtype=np.uint16),
         }
         self._colour = np.empty((total, 3 + nir), dtype=np.uint16) if colour else None
 
@@ -278,7 +287,7 @@ class _Columns:
         new = slice(self._filled, self._filled + (len(keep) if everything else int(np.count_nonzero(keep))))
         self._x[new], self._y[new], self._z[new] = kept(x), kept(y), kept(np.asarray(chunk.z))
         for name, column in self._small.items():
-            column[new] = kept(np.asarray(chunk[name]))
+            column[new] = kept(np.asarray(chunk[_DIMENSIONS[name]]))
         if self._colour is not None:
             names = set(chunk.point_format.dimension_names)
             for band, name in enumerate(("red", "green", "blue", "nir")[: self._colour.shape[1]]):
@@ -321,6 +330,9 @@ class _Columns:
         """Return the points; columns that no file fills are None."""
         end = self._filled
         small = {name: column[:end] if column[:end].any() else None for name, column in self._small.items()}
+        source = small["source"]
+        if source is not None and (source == source[0]).all():
+            small["source"] = None
         colour = None if self._colour is None else self._colour[:end]
         if colour is not None and colour.shape[1] == 4 and not colour[:, 3].any():
             colour = colour[:, :3]

@@ -35,6 +35,8 @@ class PointCloud:
     classification : ndarray of uint8, shape (n,), optional
     colour : ndarray of uint16, shape (n, 3) or (n, 4), optional
         Red, green, blue (, near infrared), full 16 bit range.
+    source : ndarray of uint16, shape (n,), optional
+        Point source id: the flight strip; None when all points have the same.
     """
 
     x: NDArray[np.float64]
@@ -45,6 +47,7 @@ class PointCloud:
     intensity: NDArray[np.uint16] | None = None
     classification: NDArray[np.uint8] | None = None
     colour: NDArray[np.uint16] | None = None
+    source: NDArray[np.uint16] | None = None
 
     def __len__(self) -> int:
         return len(self.x)
@@ -63,7 +66,7 @@ class PointCloud:
         return self.take((self.x >= xmin) & (self.x <= xmax) & (self.y >= ymin) & (self.y <= ymax))
 
     def repeats(self) -> NDArray[np.bool_]:
-        """Return which points equal an earlier one in everything, shape (n,): tiles that overlap hold some twice.
+        """Return which points equal an earlier one in all but the source, shape (n,): tiles that overlap have such.
 
         One point in 64 is looked at first, chosen by its coordinates so that all its copies are: points without any
         copy among those need no sorting.
@@ -79,7 +82,7 @@ class PointCloud:
         equal = np.ones(len(later), dtype=np.bool_)
         for field in dataclasses.fields(self):
             column = getattr(self, field.name)
-            if column is not None:
+            if column is not None and field.name != "source":
                 agree = column[later] == column[earlier]
                 equal &= agree if agree.ndim == 1 else agree.all(axis=1)
         repeated[later[equal]] = True

@@ -23,11 +23,11 @@ def roughness(x, y, z, grid, width):
 
 
 def tally(index, inside, heights, returns, threshold, size):
-    """Return per cell the points, the high points, those of several returns and the sum of their heights."""
-    tallies = np.zeros((4, size))
+    """Return per cell points, high points, those of several and of unknown returns, and the sum of their heights."""
+    tallies = np.zeros((5, size))
     for cell, is_inside, height, number in zip(index, inside, heights, returns, strict=True):
         if is_inside and np.isfinite(height):
             tallies[0, cell] += 1
             if height > threshold:
-                tallies[1:, cell] += 1, number > 1, height
+                tallies[1:, cell] += 1, number > 1, number == 0, height
     return tallies

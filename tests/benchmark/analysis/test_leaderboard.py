@@ -26,8 +26,8 @@ def squares(count, shift=0.0):
 class Memory:
     """What a leaderboard asks of a store."""
 
-    def __init__(self, evaluations, references, notes):
-        self._evaluations, self._references, self._notes = evaluations, references, notes
+    def __init__(self, evaluations, references, notes, cues):
+        self._evaluations, self._references, self._notes, self._cues = evaluations, references, notes, cues
 
     def evaluations(self, run_ids, evaluator, key):
         assert key == KEYED.key
@@ -43,12 +43,15 @@ class Memory:
     def run_notes(self, run_ids):
         return {run_id: self._notes[run_id] for run_id in run_ids if run_id in self._notes}
 
+    def run_cues(self, run_ids):
+        return {run_id: self._cues[run_id] for run_id in run_ids if run_id in self._cues}
+
 
 class Runs:
     """Rows and evaluations, run by run."""
 
     def __init__(self):
-        self.rows, self.evaluations, self.references, self.notes = [], {}, {}, {}
+        self.rows, self.evaluations, self.references, self.notes, self.cues = [], {}, {}, {}, {}
 
     def add(self, label, scene, found=None, *, of=10, shift=0.5, seed=0, status="ok", **costs):
         number = len(self.rows) + 1
@@ -75,7 +78,7 @@ class Runs:
         return self
 
     def board(self, **options):
-        memory = Memory(self.evaluations, self.references, self.notes)
+        memory = Memory(self.evaluations, self.references, self.notes, self.cues)
         return make_leaderboard(self.rows, memory, KEYED, title="t", **options)
 
 
@@ -255,6 +258,23 @@ def test_a_note_of_several_runs_stands_once_with_its_scenes():
         "hamlet-1, hamlet-2, hamlet-3, hamlet-4 and 2 more: no DEM",
         "one on hamlet-1: no point",
     )
+
+
+def test_cues_that_a_detector_used_are_noted_with_the_number_of_scenes():
+    runs = Runs()
+    for scene in range(1, 4):
+        runs.add("one", scene, 9).add("other", scene, 8).add("none", scene, 8)
+        runs.cues |= {len(runs.rows) - 2: ("returns", "texture") if scene < 3 else ("texture",), len(runs.rows): ()}
+    board = runs.board()
+    assert board.cues["one"]["returns"] == ("hamlet-1", "hamlet-2")
+    assert "other" not in board.cues
+    assert board.notes[-2:] == ("cues that one used: texture; returns on 2 of 3 scenes", "cues that none used: none")
+
+
+def test_cues_of_failed_runs_do_not_count():
+    runs = Runs().add("one", 1, 9).add("one", 2, status="failed")
+    runs.cues |= {1: ("texture",), 2: ("returns",)}
+    assert runs.board().cues == {"one": {"": ("hamlet-1",), "texture": ("hamlet-1",)}}
 
 
 def test_many_different_notes_are_counted():

@@ -203,12 +203,17 @@ def test_nan_in_attributes_is_none(tmp_path):
 
 
 def test_notes_of_runs_and_no_others(store):
-    noted = Outcome(status="ok", cost=Cost(seconds=1.0, cpu_seconds=1.0, peak_memory=1), metadata={"notes": ["no DEM"]})
+    noted = Outcome(
+        status="ok",
+        cost=Cost(seconds=1.0, cpu_seconds=1.0, peak_memory=1),
+        metadata={"notes": ["no DEM"], "cues": ["texture", "returns"]},
+    )
     other = Outcome(status="ok", cost=Cost(seconds=1.0, cpu_seconds=1.0, peak_memory=1), metadata={"notes": "a text"})
     first = store.record(identity("noted"), noted, version="1")
     second = store.record(identity("other"), other, version="1")
     assert store.run_notes([1, 2, 3, first, second]) == {first: ("no DEM",)}
     assert store.run_notes([1]) == {}
+    assert store.run_cues([1, 2, 3, first, second]) == {first: ("texture", "returns")}
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,8 @@ def maps(*clouds, window=1.0):
 def test_a_tilted_plane_has_no_texture_and_single_returns_no_pulse_difference():
     found = maps(points_of(lambda x, y: 0.3 * x + 0.2 * y))
     assert found.strength[10:-10, 10:-10] == pytest.approx(0, abs=1e-4)
-    assert found.pulse_difference is None
+    assert (found.pulse_difference == 0).all()
+    assert not found.numbered
     assert found.height[0, 0] == pytest.approx(0.3 * 0.5 + 0.2 * 39.5)
 
 
@@ -55,6 +56,30 @@ def test_crowns_have_a_pulse_difference_and_walls_do_not():
     assert maps(ground, tree).pulse_difference[30, 10] == pytest.approx(7.0)
     assert maps(ground, wall).pulse_difference[:, 28:33] == pytest.approx(7.0, abs=7.0)
     assert maps(ground, tree).pulse_difference[5, 30] == 0
+
+
+def test_points_of_unknown_numbers_are_first_and_last_returns():
+    ground = points_of(lambda x, y: 0 * x, number=2, returns=2)
+    tree = points_of(lambda x, y: np.where((abs(x - 10) < 4) & (abs(y - 10) < 4), 7.0, 0.0), number=1, returns=2)
+    unknown = [replace(cloud, return_number=0 * cloud.x, number_of_returns=0 * cloud.x) for cloud in (ground, tree)]
+    known, found = maps(ground, tree), maps(*unknown)
+    assert (known.numbered, found.numbered) == (True, False)
+    assert (found.pulse_difference == known.pulse_difference).all()
+
+
+def test_without_return_numbers_the_range_of_heights_takes_their_place():
+    scene = rb.make_scene("vaihingen-a-small", seed=1)
+    points = replace(scene.points, return_number=None, number_of_returns=None)
+    bare = rb.Scene(scene.name, scene.extent, points=points, dem=scene.dem, reference=scene.reference, crs=scene.crs)
+    known = rb.Scene(
+        scene.name, scene.extent, points=scene.points, dem=scene.dem, reference=scene.reference, crs=scene.crs
+    )
+    found = rb.detect(bare, "dempster-shafer")
+    assert found.metadata["cues"] == ["height", "roughness", "range of heights"]
+    quality, best = (
+        rb.evaluate(rb.detect(one, "dempster-shafer"), scene.reference).pixel.quality for one in (bare, known)
+    )
+    assert quality > best - 0.05
 
 
 def test_most_buildings_of_the_hamlet_are_found():
@@ -124,4 +149,4 @@ def test_numbers_that_name_no_last_return_are_silent_and_buildings_are_found(num
     found, plain = (rb.detect(one, "dempster-shafer") for one in (odd, bare))
     assert len(found) == len(plain) > 5
     assert (found.areas == plain.areas).all()
-    assert "'pulse difference' is not used: most cells have no first or no last return" in found.metadata["notes"][0]
+    assert "pulse difference" not in found.metadata["cues"]
