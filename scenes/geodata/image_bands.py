@@ -14,10 +14,13 @@ from .raster_headers import RasterHeader
 
 __all__ = [
     "BANDS",
+    "IMAGE_TYPES",
     "alpha_of",
     "assumed_bands",
     "band_names",
+    "described_bands",
     "looks_like_values",
+    "named_infrared",
     "require_image_type",
     "require_infrared",
     "sampled_largest",
@@ -25,6 +28,8 @@ __all__ = [
 
 #: Names that a band can have; any other in ``bands=`` is refused, ``-`` skips one.
 BANDS = ("red", "green", "blue", "nir", "grey")
+#: Types of the values of orthoimages.
+IMAGE_TYPES = ("uint8", "uint16")
 _DEFAULT_BANDS = {1: ("grey",), 3: ("red", "green", "blue"), 4: ("red", "green", "blue", "nir")}
 #: Words of descriptions, in some languages of mapping agencies.
 _WORDS = {
@@ -34,6 +39,8 @@ _WORDS = {
     "nir": {"nir", "ir", "infrared", "nearinfrared", "infrarot", "infrarouge", "infrarrojo", "infrarood", "pir"},
     "grey": {"grey", "gray", "pan", "panchromatic", "grau", "gris"},
 }
+#: Words of file names of colour infrared: near infrared, red, green.
+_COLOUR_INFRARED = {"cir", "irc", "irg", "nrg", "irrg", "fcir"}
 #: Letters that are the whole of a description.
 _LETTERS = {"r": "red", "g": "green", "b": "blue", "n": "nir", "i": "nir"}
 #: Words of bands between and beyond the colours.
@@ -149,6 +156,23 @@ def _described(text: str) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
+def described_bands(header: RasterHeader) -> tuple[str, ...]:
+    """Return the names of the bands by their descriptions, empty texts for those that these do not name."""
+    return tuple(map(_described, header.band_names))
+
+
+def named_infrared(header: RasterHeader) -> bool:
+    """Return whether the name of a file says that it holds near infrared, alone or as colour infrared.
+
+    >>> from types import SimpleNamespace
+    >>> from pathlib import Path
+    >>> [named_infrared(SimpleNamespace(path=Path(name))) for name in ("dop20_cir.tif", "ortho-IR-2024.tif", "air.tif")]
+    [True, True, False]
+    """
+    words = set(re.findall(r"[^\W\d_]+", header.path.stem.lower()))
+    return bool(words & (_WORDS["nir"] | _COLOUR_INFRARED))
+
+
 def alpha_of(header: RasterHeader, names: Sequence[str]) -> bool | None:
     """Return whether the last band is read as a mask (True), as values (False), or as the file marks it (None)."""
     if len(names) > header.band_count and names[-1] != "-":
@@ -199,7 +223,7 @@ def sampled_largest(header: RasterHeader, names: Sequence[str]) -> int:
 
 def require_image_type(header: RasterHeader) -> None:
     """Raise `InputError` unless the values can be those of an orthoimage."""
-    if header.dtype not in ("uint8", "uint16"):
+    if header.dtype not in IMAGE_TYPES:
         raise InputError(
             f"{header.path} has {header.dtype} values, an orthoimage needs uint8 or uint16: convert it, for instance "
             "with gdal_translate -ot Byte -scale"

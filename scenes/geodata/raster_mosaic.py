@@ -25,6 +25,7 @@ from .raster_headers import RasterHeader
 
 __all__ = [
     "largest_value",
+    "mosaic_bands",
     "mosaic_elevation",
     "mosaic_image",
     "raster_sources",
@@ -107,8 +108,7 @@ def mosaic_image(
         if set(names) - {"-"} != set(kept):
             raise InputError(
                 f"{header.path} has the bands {', '.join(names)} but {headers[0].path} {', '.join(kept)}: "
-                "images of one scene must have the same; stack infrared of the same place into one file, for instance "
-                "with gdalbuildvrt -separate, and name its bands by bands="
+                "images of one scene must have the same; give near infrared of the same place by nir="
             )
         require_image_type(header)
         if header.dtype != headers[0].dtype:
@@ -131,8 +131,7 @@ def mosaic_image(
         if shared.is_another_image:
             raise InputError(
                 f"{header.path} shows the same place as other images of the scene, with other values: nothing of it "
-                "would be used. Give one of them; if one is infrared, stack the bands into one file, for instance "
-                "with gdalbuildvrt -separate, and name them by bands="
+                "would be used. Give one of them; if one is near infrared, give it by nir="
             )
         if shared.is_whole and note is not None:
             note(f"{header.path.name} is not used: other images have data in all of its cells")
@@ -149,6 +148,25 @@ def largest_value(header: RasterHeader, grid: Grid, *, crs: str, bands: Sequence
         if largest > UNDOUBTED:
             break
     return largest
+
+
+def mosaic_bands(
+    headers: Sequence[RasterHeader], names: Sequence[str], grid: Grid, *, crs: str, bands: Sequence[str] | None = None
+) -> NDArray[np.float32]:
+    """Bring some bands of images of any type to `grid` in `crs`, shape (names, rows, columns); NaN without data.
+
+    Scale and offset that a file names are applied. Where files overlap the first that has data wins. `bands`: names of
+    the bands of files that do not name them.
+    """
+    values = np.full((len(names), *grid.shape), np.nan, dtype=np.float32)
+    for header in headers:
+        own = band_names(header, bands)
+        indexes = [own.index(name) + 1 for name in names]
+        for rows, columns, block, has_data in _warped(header, indexes, grid, crs, alpha=alpha_of(header, own)):
+            part = values[:, rows, columns]
+            fresh = has_data & np.isfinite(block).all(axis=0) & np.isnan(part[0])
+            part[:, fresh] = block[:, fresh] * np.float32(header.scale) + np.float32(header.offset)
+    return values
 
 
 def mosaic_elevation(headers: Sequence[RasterHeader], grid: Grid, *, crs: str) -> Elevation:

@@ -22,10 +22,13 @@ def image_depths(
 ) -> tuple[list[int], list[int]]:
     """Return the bits of the values of images and of infrared beside them, and note those below 16.
 
-    Infrared is compared with red, so that both have one depth.
+    Infrared is compared with red, so that both have one depth where both are of one band and type; else that of
+    infrared is decided with its scale (`infrared_layer`).
     """
-    headers = [(header, bands) for header in images] + [(header, ("nir",)) for header in infrared]
-    if any(header.dtype != "uint16" for header, _ in headers) or any(header.band_count != 1 for header in infrared):
+    headers = [(header, bands) for header in images]
+    if all((header.band_count, header.dtype) == (1, "uint16") for header in infrared):
+        headers += [(header, ("nir",)) for header in infrared]
+    if any(header.dtype != "uint16" for header in images):
         return [16] * len(images), [16] * len(infrared)
     unnamed = [(header, names) for header, names in headers if header.depth is None]
     largest = [largest_value(header, grid, crs=place.crs, bands=names) for header, names in unnamed]
@@ -34,4 +37,4 @@ def image_depths(
     for depth in sorted(set(depths) - {16}):
         files = [header.path for (header, _), own in zip(headers, depths, strict=True) if own == depth]
         place.log.note(f"{file_names(files)}: {depth_note(depth)}")
-    return depths[: len(images)], depths[len(images) :]
+    return depths[: len(images)], depths[len(images) :] or [16] * len(infrared)

@@ -12,6 +12,7 @@ from ..geodata.raster import Image
 from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_image
 from .image_depth import image_depths
+from .infrared_files import separated_by_values
 from .infrared_layer import with_infrared
 from .place import Place, extent_text, file_names, file_paths
 from .raster_layer import check_size, grid_of, note_resampling
@@ -30,6 +31,8 @@ def image_of(
 
     Near infrared of files of its own, if there is any, becomes a further band.
     """
+    if bands is None and not infrared:
+        images, infrared = separated_by_values(place, images)
     grid = grid_of(place, images[0], gsd)
     check_size(place, grid.gsd, "gsd")
     note_resampling(place, images, grid)

@@ -29,6 +29,7 @@ from ..scene import Scene
 from .area_layer import area_of_extent, read_area
 from .dem_layer import dem_of, dem_of_points
 from .image_layer import image_of, image_of_points
+from .infrared_files import separated
 from .place import ImportLog, Place
 from .placing import assign_crs, decide_place
 from .point_layer import points_of
@@ -96,6 +97,8 @@ def import_scene(
     )
     for image in images:
         band_names(image, request.bands)
+    if not infrared:
+        images, infrared = separated(images, request.bands, log)
     place, surfaces, images = decide_place(request, clouds, surfaces, images, log)
     infrared, models = assign_crs(infrared, place.crs, log), assign_crs(models, place.crs, log)
     headers = _Headers(clouds, surfaces, images, infrared, models)

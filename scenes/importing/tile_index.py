@@ -21,7 +21,7 @@ from ...core.wording import counted
 from ..folder import FILES, MANIFEST, open_scene, read_manifest, write_manifest
 from ..geodata.colour_depth import common_depths, depth_note
 from ..geodata.crs import crs_label, named_crs, require_metric, same_crs
-from ..geodata.image_bands import band_names, require_infrared, sampled_largest
+from ..geodata.image_bands import IMAGE_TYPES, band_names, require_infrared, sampled_largest
 from ..geodata.las_files import read_chunks, read_las_header
 from ..geodata.point_chunks import read_chunk_index, write_chunk_index
 from ..geodata.raster import Grid
@@ -30,11 +30,9 @@ from ..geodata.raster_mosaic import raster_sources
 from ..scene import Scene
 from ..tile_layers import checksum
 
-__all__ = ["IMAGE_TYPES", "IndexedFolder", "index_folder"]
+__all__ = ["IndexedFolder", "index_folder"]
 
 _POINTS, _RASTERS = (".las", ".laz"), (".tif", ".tiff", ".jp2", ".vrt")
-#: Types of the cells of images.
-IMAGE_TYPES = ("uint8", "uint16")
 #: Largest shift between the cells of two rasters that still coincide, cells.
 _SAME_CELLS = 1e-3
 #: Number of points from which the chunks of a file are indexed.

@@ -15,13 +15,14 @@ from typing import Any
 from ...core.errors import InputError, ParameterError
 from ...core.output import whole_folder
 from ..folder import FILES, SCENE_FILES, open_scene, write_area, write_reference
+from ..geodata.image_bands import IMAGE_TYPES
 from ..geodata.point_chunks import CHUNK_INDEX
 from ..geodata.raster_headers import read_raster_header
 from .area_layer import area_of_extent, read_area
 from .place import ImportLog, Place
 from .reference_layer import blocks_of, read_reference, rectangles_of
 from .request import ImportRequest
-from .tile_index import IMAGE_TYPES, IndexedFolder, index_folder
+from .tile_index import IndexedFolder, index_folder
 
 __all__ = ["import_tiles"]
 
