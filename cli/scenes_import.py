@@ -44,7 +44,9 @@ def import_(
     ] = None,
     nir: Annotated[
         list[str] | None,
-        typer.Option("--nir", metavar="FILE", help="Near infrared of the orthoimage as a file of its own, one band."),
+        typer.Option(
+            "--nir", metavar="FILE", help="Near infrared (or colour infrared) of the orthoimage as a file of its own."
+        ),
     ] = None,
     dem: Annotated[
         list[str] | None,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 from ..core.errors import InputError
 from .geodata.point_chunks import read_chunk_index
 from .geodata.points import PointCloud
-from .geodata.raster import Grid
+from .geodata.raster import Grid, Image
 from .remote import fetch_into_copy
 
 __all__ = ["TILED_LAYERS", "TileFile", "TiledLayer", "checksum", "tile_problem", "tiled_layers"]
 
-#: Layers that may lie in tiles.
-TILED_LAYERS = ("points", "image", "dem")
+#: Layers that may lie in tiles; infrared becomes a band of the image.
+TILED_LAYERS = ("points", "image", "dem", "infrared")
 
 _Extent = tuple[float, float, float, float]
 
@@ -55,6 +55,8 @@ class TileFile:
         Of an image, in the order of the file; ``-`` skips one.
     depth : int
         Bits of the values of an image of 16 bit; fewer are scaled to 16.
+    gain : float
+        Factor from the values of infrared to shares of the white of the image.
     """
 
     layer: str
@@ -64,6 +66,7 @@ class TileFile:
     gsd: float | None = None
     bands: tuple[str, ...] = ()
     depth: int = 16
+    gain: float = 1.0
 
     def meets(self, extent: _Extent) -> bool:
         """Return whether the file may hold something inside an extent."""
@@ -73,12 +76,13 @@ class TileFile:
 
 @dataclass(frozen=True)
 class TiledLayer:
-    """A layer in tile files, read when it is called or by window."""
+    """A layer in tile files, read when it is called or by window; of an image with infrared in files of its own."""
 
     layer: str
     folder: Path
     files: tuple[TileFile, ...]
     crs: str
+    infrared: TiledLayer | None = None
 
     def __call__(self) -> Any:
         """Read the whole layer."""
@@ -102,16 +106,35 @@ class TiledLayer:
         grid, headers = self._grid.cut(*part), [read_raster_header(path) for path in paths]
         if self.layer == "image":
             depths = [file.depth for file in met]
-            return mosaic_image(headers, grid, crs=self.crs, bands=met[0].bands, depths=depths)
+            image = mosaic_image(headers, grid, crs=self.crs, bands=met[0].bands, depths=depths)
+            return image if self.infrared is None else self.infrared._added_to(image)
         return mosaic_elevation(headers, grid, crs=self.crs)
 
     def digest(self, extent: _Extent) -> str:
         """Return the checksums of the files that an extent meets."""
-        return f"{self.layer} {' '.join(file.sha256 for file in self._met(extent))}"
+        own = f"{self.layer} {' '.join(file.sha256 for file in self._met(extent))}"
+        return own if self.infrared is None else f"{own} {self.infrared.digest(extent)} {self.infrared.files[0].gain}"
 
     def meets(self, extent: _Extent) -> bool:
         """Return whether a file may hold something inside an extent."""
         return any(file.meets(extent) for file in self.files)
+
+    def _added_to(self, image: Image) -> Image:
+        """Return an image with the near infrared of these files; pixels without it have no data."""
+        from .geodata.infrared_scale import band_of_shares
+        from .geodata.raster_headers import read_raster_header
+        from .geodata.raster_mosaic import mosaic_bands
+
+        met = self._met(image.grid.extent)
+        headers = [read_raster_header(self._sound(file)) for file in met]
+        bands = self.files[0].bands
+        values = mosaic_bands(headers, ("nir",), image.grid, crs=self.crs, bands=bands)[0]
+        known = np.isfinite(values)
+        if image.valid is not None:
+            known &= image.valid
+        band = band_of_shares(values * np.float32(self.files[0].gain), image.values.dtype.name)
+        both = np.concatenate([image.values, band[None]])
+        return Image(both, (*image.bands, "nir"), image.grid, None if known.all() else known)
 
     def _met(self, extent: _Extent) -> list[TileFile]:
         return [file for file in self.files if file.meets(extent)]
@@ -154,6 +177,9 @@ def tiled_layers(folder: Path, entries: Sequence[Mapping[str, Any]], crs: str) -
         own = tuple(file for file in files if file.layer == layer)
         if own:
             found[layer] = TiledLayer(layer, folder, own, crs)
+    infrared = found.pop("infrared", None)
+    if infrared is not None and "image" in found:
+        found["image"] = replace(found["image"], infrared=infrared)
     return found
 
 
@@ -175,6 +201,8 @@ def tile_problem(entries: Any) -> str | None:
             return f"bounds of {entry['file']} must be [xmin, ymin, xmax, ymax] in metres"
         if entry.get("depth", 16) not in range(8, 17):
             return f"depth of {entry['file']} must be a number of bits from 8 to 16"
+        if not isinstance(entry.get("gain", 1.0), int | float) or not 0 < entry.get("gain", 1.0) < 1e9:
+            return f"gain of {entry['file']} must be a positive number"
     return None
 
 

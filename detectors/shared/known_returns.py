@@ -142,10 +142,8 @@ def _sums_of(points: PointCloud, returns: NDArray[np.uint8], blocks: Grid) -> _S
     """Return what is counted on the cells of a grid of large blocks."""
     each = round(_LARGE / _CELL)
     shape = blocks.rows * each, blocks.columns * each
-    count, several = np.zeros(shape, dtype=np.int32), np.zeros(shape, dtype=np.int32)
-    low, high = np.full(shape, np.inf, dtype=np.float32), np.full(shape, -np.inf, dtype=np.float32)
     place = blocks.west, blocks.north, _CELL
-    _count_cells(points.x, points.y, points.z, returns, place, count, several, low, high)
+    count, several, low, high = _tallied(points.x, points.y, points.z, returns, place, shape)
     rise = np.where(count > 1, high - low, np.float32(1))
     closed = rise < _CLOSED
     small = round(_SMALL / _CELL)
@@ -166,20 +164,19 @@ def _summed(values: _Counts, each: int) -> _Counts:
 
 
 @kernel
-def _count_cells(
+def _tallied(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
     z: NDArray[np.float64],
     returns: NDArray[np.uint8],
     place: tuple[float, float, float],
-    count: _Counts,
-    several: _Counts,
-    low: NDArray[np.float32],
-    high: NDArray[np.float32],
-) -> None:
-    """Fill number, multiple returns, lowest and highest point of the points of each cell whose numbers are known."""
+    shape: tuple[int, int],
+) -> tuple[_Counts, _Counts, NDArray[np.float32], NDArray[np.float32]]:
+    """Return number, multiple returns, lowest and highest of the points of each cell whose numbers are known."""
+    count, several = np.zeros(shape, dtype=np.int32), np.zeros(shape, dtype=np.int32)
+    low, high = np.full(shape, np.inf, dtype=np.float32), np.full(shape, -np.inf, dtype=np.float32)
     west, north, size = place
-    rows, columns = count.shape
+    rows, columns = shape
     for i in range(len(x)):
         if returns[i] == 0:
             continue
@@ -192,6 +189,7 @@ def _count_cells(
         several[r, c] += returns[i] > 1
         low[r, c] = min(low[r, c], height)
         high[r, c] = max(high[r, c], height)
+    return count, several, low, high
 
 
 def _silent_regions(sums: _Sums) -> NDArray[np.bool_]:

@@ -14,16 +14,19 @@ from .raster_headers import RasterHeader
 
 __all__ = [
     "BANDS",
+    "COLOUR_INFRARED",
     "IMAGE_TYPES",
     "alpha_of",
     "assumed_bands",
     "band_names",
     "described_bands",
+    "infrared_bands",
     "looks_like_values",
     "named_infrared",
     "require_image_type",
     "require_infrared",
     "sampled_largest",
+    "says_infrared",
 ]
 
 #: Names that a band can have; any other in ``bands=`` is refused, ``-`` skips one.
@@ -39,8 +42,9 @@ _WORDS = {
     "nir": {"nir", "ir", "infrared", "nearinfrared", "infrarot", "infrarouge", "infrarrojo", "infrarood", "pir"},
     "grey": {"grey", "gray", "pan", "panchromatic", "grau", "gris"},
 }
-#: Words of file names of colour infrared: near infrared, red, green.
-_COLOUR_INFRARED = {"cir", "irc", "irg", "nrg", "irrg", "fcir"}
+#: Bands of colour infrared, and words of its file names.
+COLOUR_INFRARED = ("nir", "red", "green")
+_CIR_WORDS = {"cir", "irc", "irg", "nrg", "irrg", "fcir"}
 #: Letters that are the whole of a description.
 _LETTERS = {"r": "red", "g": "green", "b": "blue", "n": "nir", "i": "nir"}
 #: Words of bands between and beyond the colours.
@@ -170,7 +174,31 @@ def named_infrared(header: RasterHeader) -> bool:
     [True, True, False]
     """
     words = set(re.findall(r"[^\W\d_]+", header.path.stem.lower()))
-    return bool(words & (_WORDS["nir"] | _COLOUR_INFRARED))
+    return bool(words & (_WORDS["nir"] | _CIR_WORDS))
+
+
+def says_infrared(header: RasterHeader) -> bool:
+    """Return whether a file says that it holds near infrared and no blue: by its bands, else by its name."""
+    described = described_bands(header)
+    if header.band_count in (1, 3) and not any(described) and named_infrared(header):
+        return True
+    if header.band_count == 1:
+        return described == ("nir",)
+    if not all(described) and header.band_count not in _DEFAULT_BANDS:
+        return False
+    names = band_names(header, None)
+    return "nir" in names and "blue" not in names
+
+
+def infrared_bands(header: RasterHeader) -> tuple[str, ...] | None:
+    """Return the names of the bands of a file of near infrared; None where it is not known which band that is."""
+    if header.band_count == 1:
+        return ("nir",)
+    names = band_names(header, None)
+    if "nir" in names:
+        return names
+    unnamed = header.band_count == 3 and not any(described_bands(header))
+    return COLOUR_INFRARED if unnamed and named_infrared(header) else None
 
 
 def alpha_of(header: RasterHeader, names: Sequence[str]) -> bool | None:

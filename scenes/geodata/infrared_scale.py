@@ -23,7 +23,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["gain_of_grey_surfaces", "gain_of_red", "shows_red_and_green_of", "white_of"]
+__all__ = ["band_of_shares", "gain_of_grey_surfaces", "gain_of_red", "shows_red_and_green_of", "white_of"]
 
 _Floats = NDArray[np.float32]
 
@@ -70,6 +70,17 @@ def white_of(values: _Floats, dtype: str, depth: int) -> float:
     known = values[np.isfinite(values)]
     largest = float(np.quantile(known, 0.999)) if len(known) else 0.0
     return next((white for white in _WHITES if largest <= _GLINT * white), largest)
+
+
+def band_of_shares(shares: _Floats, dtype: str) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Return shares of white, NaN without data, as values of an image; those without data are 0.
+
+    >>> band_of_shares(np.float32([0.5, 1.2, np.nan]), "uint8").tolist()
+    [128, 255, 0]
+    """
+    top = np.float32(np.iinfo(dtype).max)
+    values: NDArray[np.uint8] | NDArray[np.uint16] = np.clip(np.rint(np.nan_to_num(shares) * top), 0, top).astype(dtype)
+    return values
 
 
 def gain_of_grey_surfaces(infrared: _Floats, colours: Mapping[str, _Floats]) -> float:

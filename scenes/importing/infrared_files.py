@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..geodata.image_bands import IMAGE_TYPES, band_names, described_bands, named_infrared
+from ..geodata.image_bands import IMAGE_TYPES, band_names, described_bands, says_infrared
 from ..geodata.raster import Grid
 from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_image, warped_extent
@@ -31,7 +31,7 @@ def separated(
 
     `bands` names the bands of all images, which are then alike.
     """
-    infrared = [header for header in images if bands is None and _says_infrared(header)]
+    infrared = [header for header in images if bands is None and says_infrared(header)]
     colour = [header for header in images if header not in infrared]
     if not infrared or not colour or any(set(band_names(header, None)) != _COLOURS for header in colour):
         return list(images), []
@@ -57,14 +57,6 @@ def separated_by_values(place: Place, images: Sequence[RasterHeader]) -> tuple[l
 
 def _note(infrared: Sequence[RasterHeader], log: ImportLog) -> None:
     log.note(f"{file_names([header.path for header in infrared])}: taken for near infrared of the orthoimage")
-
-
-def _says_infrared(header: RasterHeader) -> bool:
-    """Return whether a file says that it holds near infrared, and no blue."""
-    if header.band_count in (1, 3) and not any(described_bands(header)) and named_infrared(header):
-        return True
-    names = described_bands(header) if header.band_count == 1 else band_names(header, None)
-    return "nir" in names and "blue" not in names
 
 
 def _infrared_of(place: Place, header: RasterHeader, other: RasterHeader) -> bool:

@@ -13,8 +13,14 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ..geodata.colour_depth import common_depths
-from ..geodata.image_bands import assumed_bands, band_names, described_bands, named_infrared, require_infrared
-from ..geodata.infrared_scale import gain_of_grey_surfaces, gain_of_red, shows_red_and_green_of, white_of
+from ..geodata.image_bands import COLOUR_INFRARED, assumed_bands, band_names, infrared_bands, require_infrared
+from ..geodata.infrared_scale import (
+    band_of_shares,
+    gain_of_grey_surfaces,
+    gain_of_red,
+    shows_red_and_green_of,
+    white_of,
+)
 from ..geodata.infrared_values import unlike_infrared
 from ..geodata.raster import Grid, Image
 from ..geodata.raster_headers import RasterHeader
@@ -22,10 +28,8 @@ from ..geodata.raster_mosaic import largest_value, mosaic_bands, mosaic_image
 from .place import Place, extent_text, file_names, file_paths
 from .raster_layer import note_resampling
 
-__all__ = ["with_infrared"]
+__all__ = ["gain_of", "kind_of_values", "shows_colour_infrared", "with_infrared"]
 
-#: Bands of colour infrared.
-_COLOUR_INFRARED = ("nir", "red", "green")
 #: Pixels over which images are averaged before they are compared.
 _BLUR = 5
 
@@ -91,9 +95,7 @@ def _band(
     known = np.isfinite(values[0])
     if image.valid is not None:
         known &= image.valid
-    # Scaled values, such as reflectance, are no longer those of their type.
-    kind = first.dtype if (first.scale, first.offset) == (1, 0) else "float32"
-    white = white_of(values[:1], kind, _depth(place, infrared, image.grid, bands))
+    white = white_of(values[:1], kind_of_values(first), _depth(place, infrared, image.grid, bands))
     shares = values / np.float32(white)
     return _scaled(place, image, infrared, shares, known, white), None if known.all() else known
 
@@ -108,21 +110,26 @@ def _scaled(
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Return shares of white, those of near infrared before those of its red, in the type and scale of the image."""
     dtype = image.values.dtype
-    top = np.float32(np.iinfo(dtype).max)
     names, header = file_names([header.path for header in infrared]), infrared[0]
-    colours = _colours(image, known)
-    gain, why = None, "grey surfaces are about as bright as in red"
-    if len(shares) > 1:
-        gain, why = gain_of_red(shares[1][known], colours["red"]), "its red is that of the orthoimage"
-    if gain is None:
-        gain, why = gain_of_grey_surfaces(shares[0][known], colours), "grey surfaces are about as bright as in red"
+    gain, why = gain_of(shares[:, known], _colours(image, known))
     if header.dtype != dtype.name:
         place.log.note(f"{names}: {header.dtype} values were converted to {dtype.name}, {white:g} taken for white")
     if gain != 1:
         place.log.note(f"{names}: near infrared was multiplied by {gain:.3g}, so that {why}")
-    scaled = np.nan_to_num(shares[0]) * np.float32(gain) * top
-    band: NDArray[np.uint8] | NDArray[np.uint16] = np.clip(np.rint(scaled), 0, top).astype(dtype)
-    return band
+    return band_of_shares(shares[0] * np.float32(gain), dtype.name)
+
+
+def kind_of_values(header: RasterHeader) -> str:
+    """Return the type of the values of a file; of scaled ones, such as reflectance, that of any measure."""
+    return header.dtype if (header.scale, header.offset) == (1, 0) else "float32"
+
+
+def gain_of(shares: NDArray[np.float32], colours: Mapping[str, NDArray[np.float32]]) -> tuple[float, str]:
+    """Return the gain of near infrared, and why; shares of it and, in a second row, of its red where it has that."""
+    found = gain_of_red(shares[1], colours["red"]) if len(shares) > 1 else None
+    if found is not None:
+        return found, "its red is that of the orthoimage"
+    return gain_of_grey_surfaces(shares[0], colours), "grey surfaces are about as bright as in red"
 
 
 def _colours(image: Image, known: NDArray[np.bool_]) -> Mapping[str, NDArray[np.float32]]:
@@ -145,21 +152,20 @@ def _names(place: Place, image: Image, infrared: Sequence[RasterHeader]) -> tupl
     header = infrared[0]
     if header.band_count == 1:
         return ("nir",)
-    names = band_names(header, None)
-    if "nir" in names:
+    own, names, why = band_names(header, None), infrared_bands(header), "by its name"
+    if names == own:
         require_infrared(header, None)
         if sentence := assumed_bands(header, None):
             place.log.note(sentence)
+        return own
+    if header.band_count == 3 and shows_colour_infrared(place, infrared, image):
+        names, why = COLOUR_INFRARED, "its second and third band are red and green of the orthoimage"
+    if names is not None:
+        whose = file_names([one.path for one in infrared])
+        place.log.note(f"{whose}: the bands were taken for {', '.join(names)}, {why}")
         return names
-    if header.band_count == 3 and not any(described_bands(header)):
-        by_values = shows_colour_infrared(place, infrared, image)
-        if by_values or named_infrared(header):
-            why = "its second and third band are red and green of the orthoimage" if by_values else "by its name"
-            whose = file_names([one.path for one in infrared])
-            place.log.note(f"{whose}: the bands were taken for {', '.join(_COLOUR_INFRARED)}, {why}")
-            return _COLOUR_INFRARED
     raise InputError(
-        f"{header.path} has {header.band_count} bands ({', '.join(names)}), expected near infrared alone or with its "
+        f"{header.path} has {header.band_count} bands ({', '.join(own)}), expected near infrared alone or with its "
         "bands named: describe them (nir, red, green), or take that band out, for instance with gdal_translate -b 1"
     )
 

@@ -29,9 +29,10 @@ class ImportRequest:
     dsm : path or sequence of path
         Digital surface models (DSM, GeoTIFF) instead of points: each cell with a height becomes a point.
     ortho : path or sequence of path
-        Orthoimages (GeoTIFF), mosaicked; those in another CRS or of another cell size are resampled.
+        Orthoimages (GeoTIFF), mosaicked; those in another CRS or of another cell size are resampled. Those that say
+        that they are near infrared become its band ``nir``.
     nir : path or sequence of path
-        Near-infrared images of one band that show the place of `ortho`: its band ``nir``.
+        Near infrared of the place of `ortho`, alone or as colour infrared (near infrared, red, green), of any type.
     dem : path or sequence of path
         Bare-earth elevation (GeoTIFF); narrow gaps are interpolated, wide ones derived from the points. Without it, the
         DEM is derived: from points of classes 2 (ground) and 9 (water), else by a ground filter.

@@ -2,7 +2,8 @@
 
 Of each file the header is read and the checksum is computed; bounds and checksum go into the manifest, and the bounds
 of the chunks of large point files beside it (`geodata.point_chunks`). Rasters of 8 or 16 bit without sign are images,
-all others elevation models; those that a VRT shows are read through it. ``reference.gpkg`` and ``area.gpkg`` in the
+all others elevation models, except files that say that they are near infrared, which becomes a band of the images in
+colour (`infrared_tiles`); those that a VRT shows are read through it. ``reference.gpkg`` and ``area.gpkg`` in the
 folder belong to the scene.
 """
 
@@ -29,6 +30,7 @@ from ..geodata.raster_headers import RasterHeader, read_raster_header
 from ..geodata.raster_mosaic import raster_sources
 from ..scene import Scene
 from ..tile_layers import checksum
+from .infrared_tiles import infrared_entry, measured_gain
 
 __all__ = ["IndexedFolder", "index_folder"]
 
@@ -112,7 +114,7 @@ def index_folder(
         raise CRSError(f"{home}: no tile names its CRS: set crs=, such as EPSG:25832")
     chosen = named_crs(chosen)
     require_metric(chosen, str(home), remedy="give tiles in a projected CRS in metres")
-    sound = _of_one_place(tiles, chosen, problems)
+    sound = _of_one_place(_with_colours(tiles, problems), chosen, problems)
     if not sound:
         raise InputError(f"{home} holds no tile that can be used; {problems[0]}")
     manifest: dict[str, Any] = {
@@ -133,7 +135,7 @@ def index_folder(
     }
     if listed:
         manifest["files"] = listed
-    notes = _add_depths(sound)
+    notes = (*_add_depths(sound), *_add_gains(sound, chosen))
     manifest["tiles"] = [tile.entry for tile in sound]
     write_chunk_index(home, chunks)
     write_manifest(home, manifest)
@@ -162,7 +164,9 @@ def _tile(home: Path, file: Path, crs: str | None) -> _Tile:
         raise InputError(f"{file}: its cells are not square: warp it, for instance with gdalwarp -tr")
     entry["layer"] = "image" if raster.dtype in IMAGE_TYPES else "dem"
     entry["bounds"], entry["gsd"] = list(raster.grid.extent), raster.grid.gsd
-    if entry["layer"] == "image":
+    if (infrared := infrared_entry(raster)) is not None:
+        entry |= infrared
+    elif entry["layer"] == "image":
         entry["bands"] = list(band_names(raster, None))
         require_infrared(raster, None)
     else:
@@ -201,6 +205,40 @@ def _add_depths(tiles: Sequence[_Tile]) -> tuple[str, ...]:
             tile.entry["depth"] = depths[tile.entry["file"]]
     found = sorted(set(depths.values()) - {16})
     return tuple(f"{counted(list(depths.values()).count(depth), 'image')}: {depth_note(depth)}" for depth in found)
+
+
+def _with_colours(tiles: Sequence[_Tile], problems: list[str]) -> list[_Tile]:
+    """Return the tiles; files of near infrared are images by themselves where no others show red, green and blue."""
+    if any({"red", "green", "blue"} == set(tile.entry.get("bands", ())) for tile in tiles):
+        return list(tiles)
+    kept = []
+    for tile in tiles:
+        if tile.entry["layer"] == "infrared":
+            assert tile.raster is not None
+            if tile.raster.dtype not in IMAGE_TYPES:
+                problems.append(f"{tile.entry['file']} is left out: it is near infrared, and no image has red and blue")
+                continue
+            tile.entry.update(layer="image", bands=list(band_names(tile.raster, None)))
+            require_infrared(tile.raster, None)
+        kept.append(tile)
+    return kept
+
+
+def _add_gains(tiles: Sequence[_Tile], crs: str) -> tuple[str, ...]:
+    """Add the scale of near infrared to its entries, and return a note on it; none without infrared."""
+    infrared = [tile for tile in tiles if tile.entry["layer"] == "infrared"]
+    if not infrared:
+        return ()
+    images = [
+        (tile.raster, tile.entry.get("depth", 16))
+        for tile in tiles
+        if tile.entry["layer"] == "image" and tile.raster is not None
+    ]
+    headers = [tile.raster for tile in infrared if tile.raster is not None]
+    gain, note = measured_gain(headers, infrared[0].entry["bands"], images, crs)
+    for tile in infrared:
+        tile.entry["gain"] = gain
+    return (f"{counted(len(infrared), 'image')}: {note}",)
 
 
 def _require_heights(raster: RasterHeader) -> None:

@@ -1,7 +1,8 @@
 """Import of tiles: many files become a scene that is read by window, and none of them is converted.
 
 The files are linked into the scene folder (copied where the folder lies on another disk) under their own names after
-``points_``, ``ortho_`` or ``dem_``, and indexed as `tile_index` does; reference and area are imported as for any scene.
+``points_``, ``ortho_``, ``nir_`` or ``dem_``, and indexed as `tile_index` does; reference and area are imported as for
+any scene.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...core.errors import InputError, ParameterError
 from ...core.output import whole_folder
 from ..folder import FILES, SCENE_FILES, open_scene, write_area, write_reference
@@ -19,6 +22,7 @@ from ..geodata.image_bands import IMAGE_TYPES
 from ..geodata.point_chunks import CHUNK_INDEX
 from ..geodata.raster_headers import read_raster_header
 from .area_layer import area_of_extent, read_area
+from .infrared_files import separated, separated_by_values
 from .place import ImportLog, Place
 from .reference_layer import blocks_of, read_reference, rectangles_of
 from .request import ImportRequest
@@ -27,10 +31,10 @@ from .tile_index import IndexedFolder, index_folder
 __all__ = ["import_tiles"]
 
 #: Names in such a folder.
-_HOLDS = (*SCENE_FILES, CHUNK_INDEX, "points_*", "ortho_*", "dem_*")
+_HOLDS = (*SCENE_FILES, CHUNK_INDEX, "points_*", "ortho_*", "nir_*", "dem_*")
 #: Options that would need the whole in memory, or other files than those given.
 _CHANGING = (
-    "dsm", "nir", "bands", "gsd", "dem_cell", "ground_filter", "reference_from_class", "ortho_from_points", "extent",
+    "dsm", "bands", "gsd", "dem_cell", "ground_filter", "reference_from_class", "ortho_from_points", "extent",
 )  # fmt: skip
 
 
@@ -66,7 +70,7 @@ def import_tiles(
             raise ParameterError(f"tiled=True takes files as they are: leave out {name}=")
     log = ImportLog(note)
     with whole_folder(output, holds=_HOLDS, overwrite=overwrite) as folder:
-        given = {"points": request.point_files, "ortho": request.image_files, "dem": request.dem_files}
+        given = {"points": request.point_files, **_images(request), "dem": request.dem_files}
         for layer, files in given.items():
             for file in files:
                 _require_kind(layer, file)
@@ -84,9 +88,23 @@ def import_tiles(
     return IndexedFolder(open_scene(output), found.problems, found.notes)
 
 
+def _images(request: ImportRequest) -> dict[str, tuple[Path, ...]]:
+    """Return orthoimages, and files of near infrared beside them, by the beginning of their new names."""
+    if request.infrared_files or len(request.image_files) < 2:
+        return {"ortho": request.image_files, "nir": request.infrared_files}
+    headers = [read_raster_header(file) for file in request.image_files]
+    colour, infrared = separated(headers, None, ImportLog())
+    crs = request.crs or next((header.crs for header in headers if header.crs is not None), None)
+    if not infrared and crs is not None:
+        bounds = np.array([header.grid.extent for header in headers])
+        extent = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
+        colour, infrared = separated_by_values(Place(crs, extent, ImportLog()), headers)
+    return {"ortho": tuple(header.path for header in colour), "nir": tuple(header.path for header in infrared)}
+
+
 def _require_kind(layer: str, file: Path) -> None:
     """Refuse a raster that the index would take for another layer."""
-    if layer == "points":
+    if layer in ("points", "nir"):
         return
     is_image = read_raster_header(file).dtype in IMAGE_TYPES
     if layer == "dem" and is_image:
