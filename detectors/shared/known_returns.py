@@ -46,10 +46,10 @@ _BROKEN, _CLOSED = 2.0, 0.5
 #: Share of multiple returns in closed cells from which they are doubled. In squares of 32 m of five airborne clouds,
 #: whole and thinned to a tenth, it is 0.40 at most.
 _DOUBLED = 0.45
-#: Points in broken (or closed) cells of a region from which it is believed. Regions of the same clouds have 312 at
+#: Points in broken (or closed) cells of a region from which it counts. Regions of the same clouds have 312 at
 #: most without a multiple return, and 428 doubled.
 _FEWEST = 1000
-#: Points of a source from which it is judged, and least share of multiple returns of the other sources.
+#: Points of a source from which it is tested, and least share of multiple returns of the other sources.
 _FEWEST_OF_SOURCE, _LEAST_SHARE = 1000, 0.01
 #: Share of unknown points above which the numbers say nothing anywhere, which the tests of a whole cloud report.
 _NEARLY_ALL = 0.98
