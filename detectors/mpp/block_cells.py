@@ -12,7 +12,7 @@ gap
     where as many pulses pass it, or return from it in parts, as from the crowns of the scene (`openness`, see `cells`).
 rim
     High cells within `_RIM` of a block at the height of the roof beside them: the window of texture of the eaves holds
-    walls, ground and what grows there, so that it is rough whatever the roof is.
+    walls, ground and what grows there, so that it is rough whatever the roof is. Cells as open as crowns are none.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ _SIGMA, _OPENING, _NARROW, _RIM = 0.75, 1.0, 5.0, 1.0
 #: Centimetres: what rises by a storey above the roofs beside it is no part of them, and largest step between a roof and
 #: its rim (`roof_step`).
 _CROWN_RISE, _RIM_STEP = 250, 50
-#: Share of the openness of crowns from which a gap between two blocks is a crown: through roofs few pulses pass.
+#: Share of the openness of crowns from which a gap between two blocks, or what surrounds a cell beside a block, is a
+#: crown: through roofs few pulses pass.
 _AS_OPEN = 0.65
 #: Square metres: largest hole that is filled.
 _HOLE = 10.0
@@ -77,12 +78,14 @@ def built_cells(
     around = cv2.GaussianBlur(np.multiply(score, high, dtype=np.float32), (0, 0), _SIGMA / gsd)
     sure = inside & (state != LOW)
     core = (high & (around > 0)) | sure
+    least = 255 * _AS_OPEN * crown_openness
     gaps = high & closed(core, 0.5 * _NARROW / gsd) & ~core
     if gaps.any():
         rising = height > _roofs_around(core & high, height, gsd).astype(np.int32) + _CROWN_RISE
-        gaps[_crowns(gaps, _whole(core, sure, gsd), rising, openness, 255 * _AS_OPEN * crown_openness)] = False
+        gaps[_crowns(gaps, _whole(core, sure, gsd), rising, openness, least)] = False
     built = _whole(core | gaps, sure, gsd)
-    built = _with_rims(built, height, high, max(round(_RIM / gsd), 1))
+    closed_to_pulses = ~(cv2.blur(openness.astype(np.float32), (3, 3)) >= least)
+    built = _with_rims(built, height, high & closed_to_pulses, max(round(_RIM / gsd), 1))
     _, labels = cv2.connectedComponents(built.astype(np.uint8), connectivity=4)
     cells = np.bincount(labels.ravel())
     kept = np.bincount(labels[inside], minlength=len(cells)) >= _CONFIRMED * cells

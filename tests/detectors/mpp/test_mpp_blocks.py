@@ -98,6 +98,14 @@ def test_the_rough_rim_of_a_roof_belongs_to_it_and_what_is_higher_or_lower_does_
         assert block_cells._with_rims(built, height, high, 2).sum() == 70 + 10 * width
 
 
+def test_a_crown_beside_a_house_at_the_height_of_its_eaves_is_no_rim_of_it():
+    house, crown = [(5, 5, 15, 20)], [(15, 5, 18, 20)]
+    rim = outlined(house, house, crowns=crown, openness=0.3)[0].area
+    assert rim == pytest.approx(11 * 15, rel=0.02)
+    assert outlined(house, house, crowns=crown, openness=0.9)[0].area == pytest.approx(10 * 15, rel=0.04)
+    assert outlined(house, house, crowns=crown, openness=0.9, crown_openness=math.nan)[0].area == rim
+
+
 def test_rims_do_not_join_two_blocks():
     rng = np.random.default_rng(3)
     for seed in range(5):
