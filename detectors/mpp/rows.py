@@ -10,8 +10,8 @@ row
     A block at least `_SHORTEST` metres long with at least `_CERTAIN_WALLS` certain party walls, or a long and narrow
     one with `_WALLS_OF_LONG`, of which one part has `_REPEATED`: houses of a row repeat under one line of roofs, while
     the wings of one building have a step each. Bends (`bends`) are certain walls if there are `_CERTAIN_WALLS`; a
-    building with wings has one or two. The parts of a row are cut at their probable party walls, and each piece is a
-    house of its own unless smaller than `_ANNEX`.
+    building with wings has one or two. So are those of a run (`runs`), where houses have a part each. The parts of a
+    row are cut at their probable party walls, and each piece is a house of its own unless smaller than `_ANNEX`.
 building
     A block that is no row with all its parts, or a house of a row with its annexes. A part outside all blocks is a
     building, too.
@@ -34,6 +34,7 @@ from .bends import count_bends
 from .buildings import block_of, outline_buildings
 from .party_walls import CERTAIN, PROBABLE, Wall, most_walls, party_walls, profile_of
 from .rectangles import to_world
+from .runs import runs_of
 from .wall_colours import Colours, colours_of
 
 __all__ = ["Levels", "find_levels"]
@@ -124,10 +125,14 @@ def find_levels(
     def colours(number: int) -> Colours | None:
         return colours_of(blocks[number], image, grid)
 
+    def walls_of(rectangle: Rectangles, number: int) -> tuple[list[Wall], int]:
+        """Return the probable walls of a rectangle and the number of certain ones."""
+        profile = profile_of(rectangle, height, state, grid, partial(colours, number), structures)
+        walls = party_walls(profile, PROBABLE, grid)
+        return walls, len(walls if len(walls) >= _MANY else party_walls(profile, CERTAIN, grid))
+
     for k in np.flatnonzero(looked_at).tolist():
-        profile = profile_of(rectangles[k], height, state, grid, partial(colours, block[k]), structures)
-        probable[k] = party_walls(profile, PROBABLE, grid)
-        certain[k] = len(probable[k] if len(probable[k]) >= _MANY else party_walls(profile, CERTAIN, grid))
+        probable[k], certain[k] = walls_of(rectangles[k], block[k])
     walls_of_block = np.bincount(block[inside], weights=certain[inside], minlength=len(blocks))
     for number in np.unique(block[looked_at]).tolist():
         members = np.flatnonzero(block == number)
@@ -138,6 +143,10 @@ def find_levels(
     most_of_block = np.zeros(len(blocks), dtype=np.int64)
     np.maximum.at(most_of_block, block[inside], certain[inside])
     row = _are_rows(blocks, walls_of_block) & (most_of_block >= _REPEATED)
+    for number in np.unique(block[looked_at & ~np.append(row, False)[block]]).tolist():
+        runs = runs_of(rectangles[block == number], grid.gsd)
+        most = max((walls_of(run, number)[1] for run in runs), default=0)
+        row[number] = most >= _CERTAIN_WALLS
     # Rows are divided by themselves below.
     outlines = outline_buildings(rectangles, blocks, grid, wanted=~np.append(row, False)[block])
     parts: list[Any] = []
