@@ -18,6 +18,7 @@ from ...core.conditions import Uses
 from ...core.parameters import parameter
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
+from ..shared.cue_information import ANCHOR
 from .adjustment import adjust_to_neighbours, adjust_to_shape
 from .box_smoothness import Smoothness, mean_smoothness, smoothness_sums
 from .boxes import Boxes, lengths, prefix_sums, widths
@@ -212,6 +213,10 @@ class Improved(LineDetector):
             limit = self.entropy_threshold
         prefix: NDArray[np.int32] = prefix_sums(entropy)
         return prefix, limit, scale
+
+    def _cues(self) -> tuple[str, ...]:
+        tested = {"score": ("gradient directions", ANCHOR), "tests": ("edge directions",), "none": ()}
+        return ("image texture", *tested[self.texture])
 
     def _heights_matter(self) -> bool:
         return self.texture == "score"

@@ -15,6 +15,7 @@ from ...scenes.geodata.footprints import Footprints
 from ...scenes.geodata.points import PointCloud
 from ...scenes.geodata.raster import Grid, Image
 from ...scenes.scene import Scene
+from ..shared.cue_information import IMAGE
 from ..steps import Step
 from .adjustment import by_length, rotate
 from .box_smoothness import Smoothness
@@ -150,6 +151,10 @@ class LineDetector(LineParameters):
         """Return the texture of the candidates; none where it is not tested."""
         return None
 
+    def _cues(self) -> tuple[str, ...]:
+        """Return the names of the cues besides height and the vegetation of the image."""
+        return ()
+
     def trace(self, scene: Scene) -> Trace:
         """Detect, and return every intermediate result."""
         scene.require(self.requires)
@@ -162,7 +167,9 @@ class LineDetector(LineParameters):
         x, y = found.grid.to_world(corners[..., 1], corners[..., 0])
         rectangles = np.stack([x, y], axis=-1)
         record: dict[str, Any] = dict(found.counts())
-        if scene.image is not None and not scene.image.is_colour and "nir" not in scene.image.bands:
+        grey = scene.image is not None and not scene.image.is_colour and "nir" not in scene.image.bands
+        record["cues"] = ["height", *self._cues(), *([] if grey else [IMAGE])]
+        if grey:
             record["notes"] = [_GREY]
         return Footprints.from_rectangles(rectangles, crs=scene.crs, metadata=record, source=self.name)
 

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.errors import InputError
+from .band_descriptions import INFRARED_WORDS, described_band
 from .infrared_values import unlike_infrared
-from .opened_rasters import opened
+from .opened_rasters import alpha_inside, opened
 from .raster_headers import RasterHeader
 
 __all__ = [
@@ -31,24 +32,14 @@ __all__ = [
 
 #: Names that a band can have; any other in ``bands=`` is refused, ``-`` skips one.
 BANDS = ("red", "green", "blue", "nir", "grey")
+#: Most values of a mask.
+_MOST_OF_MASK = 2
 #: Types of the values of orthoimages.
 IMAGE_TYPES = ("uint8", "uint16")
 _DEFAULT_BANDS = {1: ("grey",), 3: ("red", "green", "blue"), 4: ("red", "green", "blue", "nir")}
-#: Words of descriptions, in some languages of mapping agencies.
-_WORDS = {
-    "red": {"red", "rot", "rouge", "rojo", "rosso", "rood"},
-    "green": {"green", "grün", "gruen", "vert", "verde", "groen"},
-    "blue": {"blue", "blau", "bleu", "azul", "blu", "blauw"},
-    "nir": {"nir", "ir", "infrared", "nearinfrared", "infrarot", "infrarouge", "infrarrojo", "infrarood", "pir"},
-    "grey": {"grey", "gray", "pan", "panchromatic", "grau", "gris"},
-}
 #: Bands of colour infrared, and words of its file names.
 COLOUR_INFRARED = ("nir", "red", "green")
 _CIR_WORDS = {"cir", "irc", "irg", "nrg", "irrg", "fcir"}
-#: Letters that are the whole of a description.
-_LETTERS = {"r": "red", "g": "green", "b": "blue", "n": "nir", "i": "nir"}
-#: Words of bands between and beyond the colours.
-_SHADES = {"edge", "rededge", "swir", "shortwave", "thermal", "tir", "lwir", "coastal", "yellow"}
 #: Descriptions that say nothing, and those that only count.
 _UNNAMED = {"undefined", "unknown", "other", "extra"}
 _NUMBER = re.compile(r"(band|layer|channel|b)?[ _-]*\d+")
@@ -72,7 +63,7 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
         if len(set(named)) != len(named) or not named:
             raise InputError(f"bands={','.join(bands)} must name at least one band and none twice")
         return tuple(bands)
-    described = tuple(map(_described, header.band_names))
+    described = tuple(map(described_band, header.band_names))
     if all(described) and len(set(described)) == header.band_count:
         return described
     by_colour = _names_by_colour(header.colours)
@@ -103,7 +94,7 @@ def band_names(header: RasterHeader, bands: Sequence[str] | None) -> tuple[str, 
 def _says_other(texts: Sequence[str]) -> bool:
     """Return whether the last description names something; those that differ by a number alone only count."""
     text = texts[-1].strip()
-    if not text or text in _UNNAMED or _NUMBER.fullmatch(text) or _described(text):
+    if not text or text in _UNNAMED or _NUMBER.fullmatch(text) or described_band(text):
         return False
     stems = {re.sub(r"\d+$", "", other.strip()) for other in texts}
     return len(stems) > 1 or not text[-1].isdecimal()
@@ -121,7 +112,7 @@ def assumed_bands(header: RasterHeader, bands: Sequence[str] | None) -> str | No
     names = band_names(header, bands)
     if bands is not None or len(names) == 1:
         return None
-    if names == tuple(map(_described, header.band_names)):
+    if names == tuple(map(described_band, header.band_names)):
         by_colour = _names_by_colour(header.colours)
         if by_colour in (None, names):
             return None
@@ -143,26 +134,9 @@ def assumed_bands(header: RasterHeader, bands: Sequence[str] | None) -> str | No
     return None
 
 
-def _described(text: str) -> str:
-    """Return the band that a description names, such as ``B8 - NIR`` or ``near infrared``; empty where it names none.
-
-    >>> _described("b4 (red)"), _described("red edge"), _described("band 4")
-    ('red', '', '')
-    """
-    words = set(re.findall(r"[^\W\d_]+", text.lower()))
-    if {"infra", "near"} & words and "red" in words:
-        return "nir"
-    if words & _SHADES or "short" in words:
-        return ""
-    if len(words) == 1 and text.strip().lower() in _LETTERS:
-        return _LETTERS[text.strip().lower()]
-    found = {name for name, known in _WORDS.items() if words & known}
-    return found.pop() if len(found) == 1 else ""
-
-
 def described_bands(header: RasterHeader) -> tuple[str, ...]:
     """Return the names of the bands by their descriptions, empty texts for those that these do not name."""
-    return tuple(map(_described, header.band_names))
+    return tuple(map(described_band, header.band_names))
 
 
 def named_infrared(header: RasterHeader) -> bool:
@@ -174,7 +148,7 @@ def named_infrared(header: RasterHeader) -> bool:
     [True, True, False]
     """
     words = set(re.findall(r"[^\W\d_]+", header.path.stem.lower()))
-    return bool(words & (_WORDS["nir"] | _CIR_WORDS))
+    return bool(words & (INFRARED_WORDS | _CIR_WORDS))
 
 
 def says_infrared(header: RasterHeader) -> bool:
@@ -203,7 +177,7 @@ def infrared_bands(header: RasterHeader) -> tuple[str, ...] | None:
 
 def alpha_of(header: RasterHeader, names: Sequence[str]) -> bool | None:
     """Return whether the last band is read as a mask (True), as values (False), or as the file marks it (None)."""
-    if len(names) > header.band_count and names[-1] != "-":
+    if len(names) > header.band_count and (names[-1] != "-" or alpha_inside(header.path)):
         return False
     return True if header.mask_band else None
 
@@ -221,10 +195,14 @@ def looks_like_values(header: RasterHeader) -> bool:
 
 
 def require_infrared(header: RasterHeader, bands: Sequence[str] | None) -> None:
-    """Raise `InputError` where a band that is assumed to be near infrared has values that are not, of a sample."""
+    """Raise `InputError` where a band that is taken for near infrared has values that are not, of a sample.
+
+    A band that the file or the user names is near infrared, unless it has one value or two, as a mask has.
+    """
     names = band_names(header, bands)
-    if "nir" not in names or assumed_bands(header, bands) is None:
+    if "nir" not in names:
         return
+    assumed = assumed_bands(header, bands) is not None
     indexes = [index for index, name in enumerate(names, start=1) if name != "-"]
     with opened(header.path, alpha=alpha_of(header, names)) as source:
         shape = tuple(min(side, 512) for side in source.shape)
@@ -233,7 +211,11 @@ def require_infrared(header: RasterHeader, bands: Sequence[str] | None) -> None:
     by_name = {name: values.data[row][known] for row, name in enumerate(name for name in names if name != "-")}
     infrared = by_name.pop("nir")
     reason = unlike_infrared(infrared, by_name) if known.any() else None
-    if reason:
+    if reason and not assumed and len(np.unique(infrared)) <= _MOST_OF_MASK:
+        raise InputError(
+            f"{header.path}: the band that is named near infrared {reason}: name another one by bands=, or - to skip it"
+        )
+    if reason and assumed:
         skipped = ",".join("-" if name == "nir" else name for name in names)
         raise InputError(
             f"{header.path} does not name band {names.index('nir') + 1}, which {reason}, so it is not taken for near "

@@ -19,8 +19,9 @@ from xml.sax.saxutils import escape
 from ...core.errors import InputError
 from ...core.inputs import require_file
 from ...core.plain_paths import plain_path
+from .band_descriptions import described_band
 
-__all__ = ["opened"]
+__all__ = ["alpha_inside", "opened"]
 
 #: Colours that a view passes on.
 _COLOURS = ("red", "green", "blue", "gray", "alpha")
@@ -30,7 +31,9 @@ _COLOURS = ("red", "green", "blue", "gray", "alpha")
 def opened(file: Path, *, alpha: bool | None = None) -> Iterator[Any]:
     """Open a raster; what rasterio raises inside the block becomes one sentence.
 
-    With `alpha` False no band masks, with True the last one does, whatever the file says.
+    With `alpha` False no band masks and all are in the order of the file, with True the last one masks, whatever the
+    file says. By default the band that is marked as alpha masks, unless its description names a colour or near
+    infrared: GDAL marks the fourth of four bands so.
     """
     import warnings
 
@@ -43,7 +46,7 @@ def opened(file: Path, *, alpha: bool | None = None) -> Iterator[Any]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", NotGeoreferencedWarning)  # reported as an error by read_raster_header
                 source = rasterio.open(path)
-            with source, _in_layout(source, path) as ordered:
+            with source, _in_layout(source, path, alpha) as ordered:
                 if alpha is None:
                     yield ordered
                     return
@@ -59,18 +62,34 @@ def opened(file: Path, *, alpha: bool | None = None) -> Iterator[Any]:
 
 
 @contextmanager
-def _in_layout(source: Any, path: Path) -> Iterator[Any]:
-    """Yield a raster, or the view of one whose alpha band is not the last or whose bands differ in no data."""
+def _in_layout(source: Any, path: Path, alpha: bool | None) -> Iterator[Any]:
+    """Yield a raster, or the view of one whose alpha band is none or not the last, or whose bands differ in no data."""
     from rasterio.io import MemoryFile
 
-    colours = [colour.name for colour in source.colorinterp]
-    alpha_inside = "alpha" in colours[:-1]
+    marked = [colour.name for colour in source.colorinterp]
+    colours = ["undefined" if alpha is False and colour == "alpha" else colour for colour in _colours(source)]
     several = len({str(value) for value in source.nodatavals}) > 1
-    if not alpha_inside and not several:
+    if colours == marked and "alpha" not in colours[:-1] and not several:
         yield source
         return
     with MemoryFile(_view(source, path, colours, several).encode(), ext=".vrt") as memory, memory.open() as view:
         yield view
+
+
+def _colours(source: Any) -> list[str]:
+    """Return what the bands of a raster show; what is described as a colour or near infrared is no alpha."""
+    return [
+        "undefined" if colour.name == "alpha" and described_band(text or "") else colour.name
+        for colour, text in zip(source.colorinterp, source.descriptions, strict=True)
+    ]
+
+
+def alpha_inside(file: Path) -> bool:
+    """Return whether a band before the last one is marked as alpha, so that the order of bands in a view is another."""
+    import rasterio
+
+    with plain_path(file) as path, rasterio.open(path) as source:
+        return "alpha" in _colours(source)[:-1]
 
 
 def _view(source: Any, path: Path, colours: list[str], masked: bool) -> str:

@@ -142,7 +142,7 @@ def test_a_fourth_band_of_many_values_is_infrared(tmp_path):
 def test_two_images_of_one_place_are_refused_when_they_differ(tmp_path):
     rgb = raster(tmp_path / "rgb.tif", levels=(90, 110, 70))
     cir = raster(tmp_path / "cir.tif", levels=(200, 90, 110))
-    with pytest.raises(InputError, match=r"cir\.tif shows the same place .* if one is infrared"):
+    with pytest.raises(InputError, match=r"cir\.tif shows the same place .* if one is near infrared"):
         mosaic_image([rgb, cir], GRID, crs="EPSG:25832")
 
 
@@ -267,7 +267,12 @@ def test_values_of_masks_counts_and_other_bands_are_not_taken_for_infrared(tmp_p
             target.write(np.concatenate([colours, band[None].astype(np.uint8)]))
         with pytest.raises(InputError, match=f"band 4, which .*{reason}.*such as red,green,blue,-"):
             require_infrared(read_raster_header(header.path), None)
-        require_infrared(read_raster_header(header.path), ("red", "green", "blue", "nir"))
+        named = ("red", "green", "blue", "nir")
+        if reason == "1 value only":
+            with pytest.raises(InputError, match="named near infrared holds 1 value only"):
+                require_infrared(read_raster_header(header.path), named)
+        else:
+            require_infrared(read_raster_header(header.path), named)
     with rasterio.open(header.path, "r+") as target:
         target.write(rng.integers(0, 255, (80, 80), dtype=np.uint8), 4)
     require_infrared(read_raster_header(header.path), None)
@@ -360,3 +365,38 @@ def test_heights_in_metres_are_known_whatever_follows(tmp_path, unit, foreign):
     with rasterio.open(raster(tmp_path / "a.tif", levels=(10,), dtype="float32").path, "r+") as target:
         target.units = (unit,)
     assert (read_raster_header(tmp_path / "a.tif").height_unit == unit) is foreign
+
+
+def spectral(path, bands, **profile):
+    """Write bands of 0..255 beside each other, with the marks that GDAL gives."""
+    values = np.stack(bands).astype(np.uint8)
+    size = {"count": len(values), "height": values.shape[1], "width": values.shape[2], "dtype": "uint8"}
+    transform = rasterio.Affine(0.5, 0, 500_000, 0, -0.5, 5_400_000)
+    with rasterio.open(path, "w", driver="GTiff", crs="EPSG:25832", transform=transform, **size, **profile) as target:
+        target.write(values)
+    return path
+
+
+def test_near_infrared_that_gdal_marks_as_alpha_is_read_by_its_description(tmp_path):
+    colours = np.random.default_rng(0).integers(20, 200, (4, 60, 60))
+    path = spectral(tmp_path / "a.tif", colours, photometric="RGB", alpha="YES")
+    with rasterio.open(path, "r+") as target:
+        assert target.colorinterp[3].name == "alpha"
+        target.set_band_description(4, "NIR")
+        target.set_band_description(1, "Red")
+    image = read_image(path)
+    assert image.bands == ("red", "green", "blue", "nir")
+    assert image.valid is None
+    np.testing.assert_array_equal(image.values, colours)
+
+
+def test_names_of_bands_are_in_the_order_of_the_file_where_a_mark_of_alpha_stands_inside(tmp_path):
+    colours = np.random.default_rng(0).integers(20, 200, (4, 60, 60))
+    full = np.full((1, 60, 60), 255)
+    path = spectral(tmp_path / "a.tif", np.concatenate([colours, full]), photometric="RGB", alpha="YES")
+    image = read_image(path, bands=("red", "green", "blue", "nir", "-"))
+    np.testing.assert_array_equal(image.values, colours)
+    assert image.valid is None
+    header = read_raster_header(path)
+    with pytest.raises(InputError, match="holds 1 value only, as a mask does"):
+        require_infrared(header, ("red", "green", "blue", "nir"))
