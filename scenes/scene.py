@@ -209,7 +209,7 @@ class Scene(Displayed):
         if image is None or need == "image":
             return image is not None
         if need in ("colour", "brightness"):
-            return image.is_colour or (need == "brightness" and "grey" in image.bands)
+            return image.is_colour or (need == "brightness" and image.has_brightness)
         return need in image.bands
 
     def require(self, requires: tuple[str, ...]) -> None:

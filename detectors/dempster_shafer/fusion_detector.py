@@ -176,9 +176,16 @@ class DempsterShafer(Detector):
         grid = Grid.covering(scene.extent, self.cell or _default_cell(scene))
         index = None if scene.image is None else greenness(scene.image, grid, darkest=self.darkest)
         near_infrared = scene.image is not None and "nir" in scene.image.bands
-        cues = cue_maps(points, scene.heights.above(points), grid, window=self.window, vegetation=index)
+        heights = scene.heights.above(points)
+        cues = cue_maps(points, heights, grid, window=self.window, vegetation=index)
         probabilities = self._probabilities(cues, near_infrared)
         information = self._information(probabilities, cues.numbered).with_notes(known.notes)
+        if _DIFFERENCE in information.silent:
+            # Numbers that do not describe the pulses, such as those of last returns alone: the heights may.
+            unnumbered = replace(points, return_number=None, number_of_returns=None)
+            cues = cue_maps(unnumbered, heights, grid, window=self.window, vegetation=index)
+            probabilities = self._probabilities(cues, near_infrared)
+            information = self._information(probabilities, numbered=False).with_notes(information.notes)
         if information.silent:
             cues = _without(cues, information.silent)
             probabilities = self._probabilities(cues, near_infrared)

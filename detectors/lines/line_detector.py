@@ -167,7 +167,7 @@ class LineDetector(LineParameters):
         x, y = found.grid.to_world(corners[..., 1], corners[..., 0])
         rectangles = np.stack([x, y], axis=-1)
         record: dict[str, Any] = dict(found.counts())
-        grey = scene.image is not None and not scene.image.is_colour and "nir" not in scene.image.bands
+        grey = scene.image is not None and not scene.image.shows_vegetation
         record["cues"] = ["height", *self._cues(), *([] if grey else [IMAGE])]
         if grey:
             record["notes"] = [_GREY]

@@ -174,15 +174,34 @@ class Image:
         return Image(self.values[:, *part], self.bands, self.grid.cut(*part), valid)
 
     def in_colour(self) -> Image:
-        """Return the image itself where it has colours, else one whose red, green and blue are its grey band."""
+        """Return the image itself where it has colours, else one that has them as far as its bands allow.
+
+        Of colour infrared without blue, green stands for blue as well; red, green and blue of an image of one band,
+        grey or near infrared, are that band.
+        """
         if self.is_colour:
             return self
-        if "grey" not in self.bands:
+        if not self.has_brightness:
             raise InputError(f"the image has neither colours nor a band 'grey'; it has {', '.join(self.bands)}")
-        others = [index for index, name in enumerate(self.bands) if name == "nir"]
-        grey = self.bands.index("grey")
-        values = self.values[[grey, grey, grey, *others]]
-        return Image(values, ("red", "green", "blue", "nir")[: len(values)], self.grid, self.valid)
+        index = self.bands.index
+        if {"red", "green"} <= set(self.bands):
+            chosen = [index("red"), index("green"), index("green")]
+        else:
+            chosen = [index("grey") if "grey" in self.bands else index("nir")] * 3
+        if "nir" in self.bands and len(self.bands) > 1:
+            chosen.append(index("nir"))
+        return Image(self.values[chosen], ("red", "green", "blue", "nir")[: len(chosen)], self.grid, self.valid)
+
+    @property
+    def has_brightness(self) -> bool:
+        """Whether there are colours, with or without blue, or one band of grey or near infrared."""
+        return {"red", "green"} <= set(self.bands) or "grey" in self.bands or self.bands == ("nir",)
+
+    @property
+    def shows_vegetation(self) -> bool:
+        """Whether there is an index of vegetation: red with green or near infrared, or grey with near infrared."""
+        bands = set(self.bands)
+        return {"red", "green"} <= bands or ("nir" in bands and bool(bands & {"red", "grey"}))
 
     @property
     def is_colour(self) -> bool:

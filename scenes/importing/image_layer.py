@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...core.errors import InputError
+from ..geodata.grey_colours import is_grey
 from ..geodata.image_bands import assumed_bands, looks_like_values, require_infrared
 from ..geodata.points import PointCloud
 from ..geodata.raster import Image
@@ -58,7 +59,7 @@ def image_of(
             f"{file_paths([header.path for header in images])} has no data in {extent_text(place.extent)}: image and "
             "points do not overlap"
         )
-    image = _with_gaps_noted(place, image)
+    image = _as_shown(place, image, [header.path for header in images])
     return with_infrared(place, image, infrared, infrared_depths) if infrared else image
 
 
@@ -70,6 +71,15 @@ def image_of_points(place: Place, points: PointCloud, gsd: float | None, files: 
     image = image_from_points(points, place.extent, gsd=gsd, source=file_paths(files))
     how = place.log.derived["image"] = f"rastered from the colours of the points, at {image.grid.gsd:g} m"
     place.log.note(f"the orthoimage was {how}")
+    return _as_shown(place, image, files)
+
+
+def _as_shown(place: Place, image: Image, files: Sequence[Path]) -> Image:
+    """Return an image, as grey where its red, green and blue are equal, and note that and its gaps."""
+    if image.is_colour and is_grey(image):
+        place.log.note(f"{file_names(files)}: red, green and blue are equal, so that the image is grey")
+        kept = [image.bands.index(name) for name in ("red", "nir") if name in image.bands]
+        image = Image(image.values[kept], ("grey", "nir")[: len(kept)], image.grid, image.valid)
     return _with_gaps_noted(place, image)
 
 

@@ -131,13 +131,31 @@ def test_a_grey_image_is_read_as_brightness_and_said_to_be_grey():
     assert "notes" not in detect(scene).metadata
 
 
-def test_an_image_of_infrared_alone_is_a_reason_to_skip():
-    scene = SceneBuilder().build()
-    infrared = Image(scene.image.values[:1], ("nir",), scene.image.grid)
-    bare = Scene("infrared", scene.extent, points=scene.points, image=infrared, dem=scene.dem)
-    assert "red, green and blue, or a grey one" in bare.lacks(Original.requires)
+def test_infrared_alone_is_read_as_brightness_and_a_single_colour_is_a_reason_to_skip():
+    scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 30)).build()
+    band = scene.image.values[1:2]
+
+    def shown(name):
+        image = Image(band, (name,), scene.image.grid)
+        return Scene(name, scene.extent, points=scene.points, image=image, dem=scene.dem)
+
+    found, grey = detect(shown("nir")), detect(shown("grey"))
+    assert shapely.to_wkb(found.polygons).tolist() == shapely.to_wkb(grey.polygons).tolist()
+    assert found.metadata["notes"] == grey.metadata["notes"]
+    assert found.metadata["cues"] == ["height"]
+    assert "red, green and blue, or a grey one" in shown("blue").lacks(Original.requires)
     with pytest.raises(MissingInputError, match="grey"):
-        detect(bare)
+        detect(shown("blue"))
+
+
+def test_colour_infrared_without_blue_is_tested_for_vegetation():
+    scene = SceneBuilder().house(rectangle(30, 30, 15, 10, 30)).build()
+    red, green = (scene.image.values[scene.image.bands.index(name)] for name in ("red", "green"))
+    image = Image(np.stack([red, red, green]), ("nir", "red", "green"), scene.image.grid)
+    found = detect(Scene("cir", scene.extent, points=scene.points, image=image, dem=scene.dem))
+    assert len(found) == 1
+    assert found.metadata["cues"] == ["height", "image vegetation"]
+    assert "notes" not in found.metadata
 
 
 def test_a_16_bit_image_and_another_order_of_bands_change_nothing():
