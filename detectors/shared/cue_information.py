@@ -41,7 +41,8 @@ _UNKNOWN = "it is not known of any high cell"
 _GEOMETRIC = frozenset({ANCHOR, PENETRATION})
 _CONSTANT_SHARE, _CONSTANT = 0.98, 0.1
 #: Least separation. Measured on five airborne clouds with and without their return numbers, and rastered: cues that
-#: help reach 0.33 to 1.8, those that mislead 0.2 at most.
+#: help reach 0.33 to 1.8, those that mislead 0.2 at most. As far below 0, a cue says the opposite of the others: colour
+#: infrared that is read as red, green, blue has -0.3 to -1.2 there, bands in order -0.2 at least.
 _LEAST_SEPARATION = 0.25
 #: Least number of cells of each class by which a cue is tested.
 _FEWEST = 50
@@ -98,7 +99,7 @@ def informative_cues(
     among : ndarray of bool, shape (rows, columns)
         Cells that are roof or tree.
     independent : collection of str
-        Cues that know more than the others, which are silent only where they say the same everywhere.
+        Cues that know more than the others, which are silent only where they say the same everywhere, or the opposite.
     known_silent : mapping of str to str
         Reason by cue, of cues that cannot carry information.
     """
@@ -111,6 +112,11 @@ def informative_cues(
         if name in values and _is_constant(values[name]):
             silent[name] = "it has the same value everywhere"
     used = [name for name in values if name not in silent]
+    for name in sorted(set(independent) & set(used)):
+        trees, of_trees, roofs, of_roofs = _opinions(name, {other: values[other] for other in used})
+        if min(trees, roofs) >= _FEWEST and of_trees - of_roofs < -_LEAST_SEPARATION:
+            silent[name] = f"it says the opposite of the other cues (separation {of_trees - of_roofs:.2f} of 2)"
+            used.remove(name)
     while True:
         tested = {
             name: _separation(name, {other: values[other] for other in used}) for name in used if name not in untested
@@ -151,13 +157,18 @@ def _is_constant(rating: _Floats) -> bool:
 
 def _separation(name: str, values: Mapping[str, _Floats]) -> float:
     """Return the separation of a cue by the mean of the others."""
+    return _separation_of(*_opinions(name, values))
+
+
+def _opinions(name: str, values: Mapping[str, _Floats]) -> tuple[int, float, int, float]:
+    """Return number and mean rating of the cells that the mean of the other cues takes for trees, and for roofs."""
     own = values[name]
     others = [np.nan_to_num(rating) for other, rating in values.items() if other != name]
     opinion = np.mean(others, axis=0) if others else np.zeros_like(own)
     known = np.isfinite(own)
     trees, roofs = own[known & (opinion > 0)], own[known & (opinion < 0)]
     means = [float(values.mean()) if len(values) else 0.0 for values in (trees, roofs)]
-    return _separation_of(len(trees), means[0], len(roofs), means[1])
+    return len(trees), means[0], len(roofs), means[1]
 
 
 def _separation_of(trees: int, of_trees: float, roofs: int, of_roofs: float) -> float:

@@ -150,3 +150,27 @@ def test_numbers_that_name_no_last_return_are_silent_and_buildings_are_found(num
     assert len(found) == len(plain) > 5
     assert (found.areas == plain.areas).all()
     assert "pulse difference" not in found.metadata["cues"]
+
+
+def test_last_returns_alone_are_read_by_the_range_of_their_heights():
+    scene = rb.make_scene("vaihingen-a-small", seed=4)
+    last = scene.points.take(scene.points.return_number == scene.points.number_of_returns)
+    seen = rb.Scene(scene.name, scene.extent, points=last, dem=scene.dem, crs=scene.crs)
+    found = rb.detect(seen, "dempster-shafer")
+    assert found.metadata["cues"] == ["height", "roughness", "range of heights"]
+    assert "'pulse difference' is not used" in " ".join(found.metadata["notes"])
+    assert rb.evaluate(found, scene.reference).pixel.quality > 0.5
+
+
+def test_colour_infrared_that_is_read_as_red_green_blue_is_silent():
+    scene = rb.make_scene("vaihingen-a-small", seed=4)
+    index = scene.image.bands.index
+    bands = [index("nir"), index("red"), index("green")]
+    image = rb.Image(scene.image.values[bands], ("red", "green", "blue"), scene.image.grid)
+    seen, bare = (
+        rb.Scene(scene.name, scene.extent, points=scene.points, dem=scene.dem, crs=scene.crs, image=shown)
+        for shown in (image, None)
+    )
+    found, plain = (rb.detect(one, "dempster-shafer") for one in (seen, bare))
+    assert "'vegetation' is not used: it says the opposite" in " ".join(found.metadata["notes"])
+    assert (found.areas == plain.areas).all()

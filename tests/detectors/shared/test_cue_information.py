@@ -36,6 +36,15 @@ def test_a_cue_that_contradicts_the_others_is_silent():
     assert informative_cues(ratings, HIGH).used == (ANCHOR, "penetration")
 
 
+@pytest.mark.parametrize(("roofs", "trees", "used"), [(-0.5, 0.6, True), (-0.2, -0.3, True), (0.6, -0.6, False)])
+def test_a_cue_that_knows_more_is_silent_only_where_it_says_the_opposite(roofs, trees, used):
+    ratings = {ANCHOR: rating(-0.6, 0.7), "pulse difference": rating(-0.8, 0.5), "vegetation": rating(roofs, trees)}
+    found = informative_cues(ratings, HIGH, independent=("vegetation",))
+    assert ("vegetation" in found.used) == used
+    assert {ANCHOR, "pulse difference"} <= set(found.used)
+    assert used or "says the opposite of the other cues" in found.silent["vegetation"]
+
+
 def test_a_constant_cue_does_not_spoil_the_test_of_the_others():
     ratings = {"multiple returns": rating(1, 1, noise=0), ANCHOR: rating(-0.6, 0.7), "penetration": rating(-0.8, 0.2)}
     assert informative_cues(ratings, HIGH).used == (ANCHOR, "penetration")

@@ -161,3 +161,12 @@ def test_three_bands_that_nothing_says_to_be_infrared_are_refused_as_such(ortho,
     file = write(tmp_path / "three.tif", np.stack([RED, NIR, BLUE]))
     with pytest.raises(InputError, match="expected near infrared alone or with its bands named"):
         imported(tmp_path, ortho, nir=file)
+
+
+@pytest.mark.parametrize("profile", [{}, {"compress": "jpeg", "photometric": "YCBCR"}])
+def test_three_equal_bands_are_one_grey_band(tmp_path, profile):
+    file = write(tmp_path / "scan.tif", np.stack([GREEN] * 3), **profile)
+    scene = imported(tmp_path, file)
+    assert scene.image.bands == ("grey",)
+    assert any("so that the image is grey" in note for note in scene.facts["notes"])
+    assert imported(tmp_path / "b", write(tmp_path / "c.tif", PICTURE[:3])).image.bands == ("red", "green", "blue")
