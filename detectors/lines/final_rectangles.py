@@ -11,7 +11,8 @@ rise
 A strip passes when more than 40 % of it is in range in each of Y, I and Q, more than 90 % is black in the secondary
 mask, and the primary black does not rise. A rise after the primary black fell below 10 % ends the side; any other
 failure halves the strip, down to the ground sampling distance. The authors' own program differs (`filled_share`,
-`independent` and `rises_after_gap` of `FinalRules`).
+`independent` and `rises_after_gap` of `FinalRules`). By default, colours are not tested well inside the initial
+rectangle, where points prove a roof whatever its colours: another face of the roof, or a displaced image.
 Source: Awrangjeb, Ravanbakhsh & Fraser (2010), section 3.4.
 """
 
@@ -58,6 +59,8 @@ class FinalRules(NamedTuple):
         Whether all sides are extended from the shrunk rectangle, each by itself, and not one after another.
     rises_after_gap : bool
         Whether a rise counts only after the primary black fell below `gap_share`.
+    colour_margin : float
+        Colours are tested from this distance inside the sides of the initial rectangle on; infinite: in every strip.
     """
 
     reduction: float
@@ -73,6 +76,7 @@ class FinalRules(NamedTuple):
     filled_share: float = 0.0
     independent: bool = False
     rises_after_gap: bool = False
+    colour_margin: float = math.inf
 
 
 @kernel
@@ -158,8 +162,12 @@ def extended_final_side(
     rules: FinalRules,
     box: NDArray[np.float64],
     side: int,
+    initial: float,
 ) -> float:
-    """Return how far one side of a box can move outwards while the strips pass."""
+    """Return how far one side of a box can move outwards while the strips pass.
+
+    `initial` is where the side of the initial rectangle is.
+    """
     outwards = 1.0 if side in (U1, V1) else -1.0
     opposite = U0 + U1 - side if side in (U0, U1) else V0 + V1 - side
     width, before, reached, gap = rules.strip, 1.0, box[side], False
@@ -173,7 +181,8 @@ def extended_final_side(
         if rises and gap:
             break
         solid = filled > rules.black_share and (rules.rises_after_gap or not rises)
-        if solid and has_colours(colours, within, strip, rules.colour_share):
+        proven = outwards * (initial - end) >= rules.colour_margin
+        if solid and (proven or has_colours(colours, within, strip, rules.colour_share)):
             reached, before = end, black
         else:
             width /= 2
@@ -232,9 +241,8 @@ def final_rectangles(
         within = dominant_ranges(colours, box, rules.part_share, rules.total_share)
         start = box.copy()
         for side in (V0, V1, U0, U1):
-            box[side] = extended_final_side(
-                colours, primary, secondary, within, rules, start if rules.independent else box, side
-            )
+            grown = start if rules.independent else box
+            box[side] = extended_final_side(colours, primary, secondary, within, rules, grown, side, initial[i, side])
         for k in range(8):
             out[found, k] = box[k]
         final_of[i] = found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -52,6 +53,8 @@ _EXTENSION_PART = 3.5
 #: Root mean square distance from its line above which a segment contains a missed corner: in point spacings, and in
 #: pixels, because the staircase of a mask is no corner.
 _MISSED_CORNER, _STAIRCASE = 0.4, 0.5
+#: Distance by which a side of an initial rectangle may err, point spacings: what lies farther inside is roof.
+_SIDE_ERROR = 1.0
 #: Share of a length that is left for rounding.
 _ROUNDING = 1e-6
 #: Note on grey images.
@@ -326,6 +329,7 @@ class LineDetector(LineParameters):
             filled_share=self.filled_share,
             independent=self.final_order == "independent",
             rises_after_gap=self.rise_from == "gap",
+            colour_margin=math.inf if self.colour_from == "shrunk" else _SIDE_ERROR * rasters.spacing / gsd,
         )
         longest_first = np.argsort(-np.maximum(lengths(initial), widths(initial)), kind="stable")
         final, final_of = final_rectangles(

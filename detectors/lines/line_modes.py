@@ -25,6 +25,7 @@ PAPER: Mapping[str, Any] = {
     "extension_part": 1000.0,
     "inside_margin": 0.0,
     "inside_share": 1.0,
+    "colour_from": "shrunk",
     "rise": 0.0,
     "new_share": 0.0,
     "same_overlap": 1.0,

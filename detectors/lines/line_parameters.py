@@ -261,6 +261,12 @@ class LineParameters(Detector):
         doc="whether each side is extended from what the sides before it reached, or all from the same rectangle",
         source="2010, 3.4.2; program",
     )  # fmt: skip
+    colour_from: str = parameter(
+        "initial", choices=("initial", "shrunk"),
+        doc="from where the colours of strips are tested: a point spacing inside the sides of the initial rectangle, "
+        "since the points prove the roof farther inside, or from the shrunk rectangle on, as printed",
+        source="2010, 3.4.2; reading",
+    )  # fmt: skip
     colour_similarity: float = parameter(
         0.4, minimum=0, maximum=1, swept=(0.2, 0.3, 0.4, 0.5, 0.6),
         doc="least share of a step in the dominant range of Y, I and Q each", source="2010, 3.4.2 and 4.4.1",

@@ -51,6 +51,9 @@ _WIDEST_VOID = 50.0
 _CORRECTION_CELL = 4.0
 #: A void farther than this many neighbourhoods from any high point is no roof: water and wet asphalt give no returns.
 _BARE = 4.0
+#: Least number of pixels beside a high point that are black in the secondary mask. Where points are denser than pixels,
+#: the squares would be single pixels, and the outermost strip of a roof never black enough to be added.
+_LEAST_BORDER = 1
 #: Distance between successive bins of the height histogram of a tile (conference version), metres.
 _HEIGHT_BIN = 2.0
 #: Side of the cells of masks that do not follow the image, metres.
@@ -301,7 +304,7 @@ def build_masks(
     clip : bool
         Whether the primary mask is white outside the coverage.
     """
-    side = 2 * max(0, round((neighbourhood / grid.gsd - 1) / 2)) + 1
+    side = 2 * max(_LEAST_BORDER if nearest else 0, round((neighbourhood / grid.gsd - 1) / 2)) + 1
     coverage = _coverage(points, grid)
     low, high = _hits(points, thresholds, grid)
     secondary = _squares(high, side)

@@ -12,13 +12,14 @@ from roofbench.detectors.registry import make_detector
 
 PRINTED = (
     "largest_pixel=1000,marking=squares,neighbourhood=0.75,missed_corner=1000,vegetation=pseudo-ndvi,extension_stop=0.4,"
-    "extension_part=1000,inside_margin=0,inside_share=1,rise=0,new_share=0,same_overlap=1"
+    "extension_part=1000,inside_margin=0,inside_share=1,colour_from=shrunk,rise=0,new_share=0,same_overlap=1"
 )
 PROGRAM = (
     "largest_pixel=1000,ground=point-dem,below_ground=1,marking=cells,neighbourhood=0.75,curve_step=0.25,missed_corner=1000,"
     "inside_test=strip,band_width=2,vegetation=sigma,nir_threshold=25.5,rectangle_extension=1.5,extension_stop=0.4,"
     "extension_part=1000,inside_margin=0,inside_share=1,least_rectangle=2,reduction=0.3,filled_share=0.7,colour_bins=tenths,"
-    "colour_smoothing=0.5,strip_stop=0.35,final_order=independent,rise_from=gap,rise=0,new_share=0,same_overlap=1"
+    "colour_smoothing=0.5,strip_stop=0.35,final_order=independent,rise_from=gap,colour_from=shrunk,rise=0,new_share=0,"
+    "same_overlap=1"
 )
 #: (detector, mode) to the parameters that the mode sets.
 LONG_FORM = {

@@ -307,8 +307,23 @@ def test_a_side_is_extended_as_far_as_the_colour_of_the_roof_reaches():
     box = np.array([30.0, 30.0, 1.0, 0.0, -10.0, 10.0, -10.0, 10.0])
     within = dominant_ranges(colours, box, 0.97, 0.9)
     rules = FinalRules(0.15, 0.97, 0.9, 2.3, 1.0, 0.4, 0.9, 0.1, 0.0, False)
-    box[U1] = extended_final_side(colours, black, black, within, rules, box, U1)
+    box[U1] = extended_final_side(colours, black, black, within, rules, box, U1, 0.0)
     assert 30 + box[U1] == pytest.approx(60, abs=1.5)
+
+
+@pytest.mark.parametrize(("margin", "reached"), [(math.inf, 60), (0.0, 80), (5.0, 75), (25.0, 60)])
+def test_colours_are_not_tested_well_inside_the_initial_rectangle(margin, reached):
+    colours, black = two_coloured(), np.ones((60, 100), np.uint8)
+    box = np.array([30.0, 30.0, 1.0, 0.0, -10.0, 10.0, -10.0, 10.0])
+    within = dominant_ranges(colours, box, 0.97, 0.9)
+    rules = FinalRules(0.15, 0.97, 0.9, 2.0, 1.0, 0.4, 0.9, 0.1, 0.0, False, colour_margin=margin)
+    side = extended_final_side(colours, black, black, within, rules, box, U1, 50.0)  # the initial side is at 80
+    assert 30 + side == pytest.approx(reached, abs=1.5)
+    assert 30 + side <= max(60, 80 - margin) + 1.5
+    # The points must prove it in any case.
+    half = black.copy()
+    half[:, 55:] = 0
+    assert 30 + extended_final_side(colours, black, half, within, rules, box, U1, 50.0) <= 57
 
 
 def test_a_side_ends_where_the_primary_mask_is_black_again_after_a_gap():
@@ -319,7 +334,7 @@ def test_a_side_ends_where_the_primary_mask_is_black_again_after_a_gap():
     box = np.array([30.0, 30.0, 1.0, 0.0, -10.0, 10.0, -10.0, 10.0])
     within = dominant_ranges(colours, box, 0.97, 0.9)
     rules = FinalRules(0.15, 0.97, 0.9, 2.0, 1.0, 0.4, 0.9, 0.1, 0.1, False)
-    box[U1] = extended_final_side(colours, primary, secondary, within, rules, box, U1)
+    box[U1] = extended_final_side(colours, primary, secondary, within, rules, box, U1, 0.0)
     assert 50 <= 30 + box[U1] <= 54
 
 

@@ -1,5 +1,7 @@
 """The detector `original` end to end, on scenes made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -45,6 +47,31 @@ def test_a_u_with_a_narrow_court_is_three_overlapping_rectangles():
     union = shapely.union_all(found.polygons)
     assert len(found) == 3
     assert union.intersection(truth).area / union.union(truth).area > 0.9
+
+
+@pytest.mark.parametrize("detector", ["original", "improved"])
+def test_a_face_of_another_brightness_is_part_of_the_roof(detector):
+    whole, face = rectangle(30, 30, 22, 10), rectangle(40, 30, 2, 10)
+    builder = SceneBuilder().house(whole).house(face, (70, 32, 26))
+    shares = {}
+    for start in ("initial", "shrunk"):
+        chosen = make_detector(f"{detector}[colour_from={start}]")
+        found = chosen.detect(builder.build().for_detection(), np.random.default_rng(0))
+        dark = shapely.intersection(shapely.union_all(found.polygons), builder.truth()[1])
+        shares[start] = dark.area / face.area
+    assert shares["initial"] > 0.6
+    assert shares["shrunk"] < 0.3
+
+
+@pytest.mark.parametrize("gsd", [0.1, 0.15, 0.2, 0.25, 0.5])
+def test_the_rim_of_a_roof_in_dense_points_does_not_depend_on_the_pixels(gsd):
+    builder = SceneBuilder(gsd=gsd, spacing=0.3, side=40).house(rectangle(20, 20, 14, 10, 20))
+    scene = builder.build()
+    scatter = np.random.default_rng(1).normal(0, 0.12, (2, len(scene.points)))
+    points = replace(scene.points, x=scene.points.x + scatter[0], y=scene.points.y + scatter[1])
+    moved = Scene("moved", scene.extent, crs=scene.crs, points=points, image=scene.image, dem=scene.dem)
+    area = shapely.union_all(detect(moved).polygons).area
+    assert area == pytest.approx(140, rel=0.06)
 
 
 def test_a_tree_as_big_as_a_house_is_dropped_for_its_colour():

@@ -77,7 +77,7 @@ def test_independent_sides_are_all_extended_from_the_same_rectangle():
     wide = BOX.copy()
     wide[U0], wide[U1] = -20, 20
     within = dominant_ranges(grey(), wide, 0.97, 0.9)
-    assert extended_final_side(grey(), np.zeros_like(secondary), secondary, within, RULES, wide, V0) == -10
+    assert extended_final_side(grey(), np.zeros_like(secondary), secondary, within, RULES, wide, V0, 0.0) == -10
     assert found[False][V0] == found[True][V0]  # the first side in the sequence starts alike
 
 
@@ -89,11 +89,11 @@ def test_primary_black_may_rise_until_it_once_fell_below_a_tenth():
     within = dominant_ranges(grey(), BOX, 0.97, 0.9)
     free = RULES._replace(rises_after_gap=True)
     # Black, white at 62, black again at 66: the rise after the gap ends the side.
-    assert 50 + extended_final_side(grey(), primary, secondary, within, free, BOX, U1) == 66
+    assert 50 + extended_final_side(grey(), primary, secondary, within, free, BOX, U1, 0.0) == 66
     primary[:, 62:66] = 1
     primary[25:45, 62:66] = 0  # a third of the strip stays black: no gap
-    assert 50 + extended_final_side(grey(), primary, secondary, within, free, BOX, U1) == 76
-    assert 50 + extended_final_side(grey(), primary, secondary, within, RULES, BOX, U1) < 70
+    assert 50 + extended_final_side(grey(), primary, secondary, within, free, BOX, U1, 0.0) == 76
+    assert 50 + extended_final_side(grey(), primary, secondary, within, RULES, BOX, U1, 0.0) < 70
 
 
 def test_a_rectangle_without_enough_secondary_black_is_dropped():
