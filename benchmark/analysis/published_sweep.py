@@ -176,7 +176,13 @@ _FIGURE_8 = PublishedSweep(
     scenes=("fairfield-1", "fairfield-2", "fairfield-3"),
     seeds=3,
     # As printed: the ground of tiles, no tolerance, and no rules against duplicates.
-    standard={"ground": "tile-dem", "rise": 0.0, "new_share": 0.0, "same_overlap": 1.0},
+    standard={
+        "ground": "tile-dem",
+        "colour_from": "shrunk",
+        "rise": 0.0,
+        "new_share": 0.0,
+        "same_overlap": 1.0,
+    },
     statements=(
         _Statement(
             "reduction is moderately sensitive, the other four less",
