@@ -72,10 +72,10 @@ class KnownReturns:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """One sentence where the numbers are known in a part only."""
+        """One sentence where the numbers are known in a part only; in tenths, so that tiles of a city have few."""
         if not self.unknown:
             return ()
-        share = f"{self.unknown:.0%}" if self.unknown >= 0.01 else "less than 1%"
+        share = f"about {round(10 * self.unknown):d}0%" if self.unknown >= 0.05 else "a few"
         return (
             f"return numbers are not used of {share} of the points: pulses there have all one or all several returns",
         )
