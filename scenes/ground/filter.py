@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation, Grid
-from .doubt import doubtful_ground
+from .doubt import Doubt, doubtful_ground
 from .filling import fill_unknown
 from .lowest_points import default_cell, lowest_surface, mean_above
 from .objects import objects_of
@@ -89,8 +89,8 @@ def filtered_ground(
     cell: float | None = None,
     rules: tuple[float, float, float] = (130.0, 0.15, 1.0),
     tolerance: float = 0.4,
-) -> tuple[Elevation, _Mask]:
-    """Return what `ground_surface` does, and where it is unsure (`doubt`), shape (rows, columns).
+) -> tuple[Elevation, Doubt]:
+    """Return what `ground_surface` does, and where it is unsure.
 
     Parameters
     ----------
@@ -102,31 +102,34 @@ def filtered_ground(
     grid = Grid.covering(extent, cell or default_cell(x, y, extent))
     lowest = lowest_surface(x, y, z, grid)
     if np.isnan(lowest).all():
-        return Elevation(lowest, grid), np.ones(lowest.shape, dtype=bool)
+        return Elevation(lowest, grid), Doubt(grid, {"no height": np.ones(lowest.shape, dtype=bool)})
     trend = _trend(lowest, grid.gsd, largest_object)
     relief = lowest - trend
     objects = objects_of(relief, grid.gsd, largest_object, slope, wall_height)
-    if objects.mean() > _CROWDED:
-        # Roofs that cover most of a neighbourhood lift its trend: the trend of the rest is that of the land. What is
-        # left between them is narrow, so that the feet of smooth steps may not count as ground.
-        trend = _trend(np.where(objects, np.float32(np.nan), lowest), grid.gsd, largest_object)
+    crowded = objects.cells.mean() > _CROWDED
+    if crowded or objects.widest > (largest_object / 2) ** 2:
+        # Roofs that cover most of a neighbourhood lift its trend: the trend of the rest is that of the land.
+        trend = _trend(np.where(objects.cells, np.float32(np.nan), lowest), grid.gsd, largest_object)
         relief = lowest - trend
-        objects = objects_of(relief, grid.gsd, largest_object, slope, wall_height, feet=True)
-    ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
+    if crowded:
+        objects = objects_of(relief, grid.gsd, largest_object, slope, wall_height)
+    cells = objects.cells.copy()
+    ground = fill_unknown(np.where(cells, np.float32(np.nan), relief))
     # Cut hill tops and the feet of shrubs come back; what they add lets the next round reach a little further.
     for _ in range(2):
-        again = objects & (np.abs(relief - ground) < tolerance)
+        again = cells & ~objects.feet & (np.abs(relief - ground) < tolerance)
         if not again.any():
             break
-        objects &= ~again
-        ground = fill_unknown(np.where(objects, np.float32(np.nan), relief))
+        cells &= ~again
+        ground = fill_unknown(np.where(cells, np.float32(np.nan), relief))
     surface = Elevation(ground + trend, grid)
     # The lowest point is biased by the noise: the mean of the points near the ground is not.
     near = mean_above(x, y, z, surface, tolerance=tolerance)
+    near[objects.feet] = np.nan
     seen = np.isfinite(near)
     if seen.any():
         surface = Elevation(surface.values + np.nan_to_num(fill_unknown(near)), grid)
-    return surface, doubtful_ground(surface, seen, np.isfinite(lowest))
+    return surface, doubtful_ground(surface, seen, np.isfinite(lowest), objects.low, smooth=objects.smooth)
 
 
 def elevation_from_points(
@@ -187,14 +190,15 @@ def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
     base = low[known].min()
     height = np.where(known, low - base, 0)
     weight = known.astype(np.float64)
-    trend = np.zeros(low.shape)
+    trend = coarse = np.zeros(low.shape)
     for share in (1.0, 1.0, 0.5, 0.5, 0.25, 0.25, 0.25):
         trend = _local_planes(height, weight, share * largest / (cell * block))
+        coarse = trend if share == 1.0 else coarse
         above = height - trend
         spread = 1.4826 * np.median(np.abs(above[known])) + 0.1
         weight = known / (1 + (np.where(above > 0, 2, 0.5) * above / spread) ** 2)
-    # Planes are unstable where no data are near.
-    trend = fill_unknown(np.where(known, trend, np.nan).astype(np.float32)).astype(np.float64)
+    # Planes of small neighbourhoods are unstable where no data are near; those of the largest go on below a hall.
+    trend = coarse + fill_unknown(np.where(known, trend - coarse, np.nan).astype(np.float32))
     # Samples at the border lie beyond the centres of the outer blocks.
     outer = np.pad(trend, 1, mode="reflect", reflect_type="odd") if min(trend.shape) > 1 else np.pad(trend, 1, "edge")
     blocks = Elevation(outer.astype(np.float32), Grid(-block, block, block, rows + 2, columns + 2))

@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 
 from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation, Grid
-from .doubt import doubt_note
 from .filling import fill_unknown
 from .filter import filtered_ground
 
@@ -105,8 +104,8 @@ def heights_of(
         return Heights(dem)
     filtered, doubtful, doubts = None, None, []
     if points is not None:
-        filtered, unsure = filtered_ground(points, extent, cell=cell)
-        doubtful, words = Elevation(unsure.astype(np.float32), filtered.grid), doubt_note(unsure)
+        filtered, doubt = filtered_ground(points, extent, cell=cell)
+        doubtful, words = Elevation(doubt.cells.astype(np.float32), filtered.grid), doubt.note()
         doubts = [words] if words else []
     if filtered is not None and np.isnan(filtered.values).all():
         filtered = doubtful = None

@@ -13,7 +13,6 @@ from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation
 from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_elevation, warped_extent
-from ..ground.doubt import doubt_note
 from ..ground.filling import fill_unknown
 from ..ground.filter import elevation_from_points, filtered_ground
 from ..ground.heights import HIGHEST_LAND, LOWEST_LAND, SEAM, fill_voids
@@ -121,9 +120,9 @@ def _ground_of_points(
     if ground_filter is None and classes is not None and np.any(classes == _GROUND):
         dem = elevation_from_points(points, place.extent, cell=cell or 1.0, classes=(_GROUND, _WATER))
         return dem, "from the points of classes 2 (ground) and 9 (water), gaps interpolated", None
-    dem, unsure = filtered_ground(points, place.extent, cell=cell)
+    dem, doubt = filtered_ground(points, place.extent, cell=cell)
     why = ", since no point is classified as ground" if ground_filter is None else ""
-    return dem, f"by a ground filter (progressive opening){why}", doubt_note(unsure)
+    return dem, f"by a ground filter (progressive opening){why}", doubt.note()
 
 
 def _compare_heights(place: Place, points: PointCloud, dem: Elevation, file: str) -> None:
