@@ -31,9 +31,12 @@ from roofbench.detectors.mpp import (
     block_cells,
     image_cue,
     mpp_detector,
+    party_walls,
     preparation,
     raised_walls,
     rows,
+    runs,
+    shears,
 )
 from roofbench.detectors.registry import make_detector
 from roofbench.detectors.shared import cue_information
@@ -61,6 +64,9 @@ THRESHOLDS = {
     "share of the chimneys in a series": (raised_walls, "_MOST", None, (0.5, 0.6, 0.75, 0.9)),
     "standard deviations of a parapet": (raised_walls, "_BEYOND", 1000, (1.5, 2.0, 2.5, 3.0, 1000)),
     "least change of direction, degrees": (bends, "_LEAST", 90, (3, 5, 8, 90)),
+    "agreement along a shear, times that without": (shears, "_CLEARLY", 1000, (1.0, 1.1, 1.2, 1.5, 1000)),
+    "strength of oblique walls, times that of others": (party_walls, "_SHARPER", 1000, (1.0, 1.2, 1.5, 1000)),
+    "common depth of the houses of a run": (runs, "_ALIKE", 1000, (0.5, 0.7, 0.9, 1000)),
 }  # fmt: skip
 
 #: Numbers that cells, their scores or boxes depend on.
