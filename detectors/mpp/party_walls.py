@@ -137,6 +137,8 @@ class Profile(NamedTuple):
         See `raised_walls`.
     chimneys : ndarray or None
         Stations of the chimneys; None on a flat roof.
+    strengths : dict
+        The evidence of all marks by rule, as far as it was asked for.
     """
 
     lattice: Lattice
@@ -144,6 +146,7 @@ class Profile(NamedTuple):
     colours: Marks | None
     rise: Floats | None
     chimneys: Floats | None
+    strengths: dict[WallRule, Floats]
 
 
 def profile_of(
@@ -184,7 +187,7 @@ def profile_of(
         if lattice.depth <= _DEEPEST and structures is not None:
             rise = rises(roof + structures[row, column] / 100.0)
             stacks = chimneys(rise) if _is_pitched(roof) else None
-        return Profile(lattice, roof_marks(roof[inner]), edges, rise, stacks)
+        return Profile(lattice, roof_marks(roof[inner]), edges, rise, stacks, {})
 
     def roof_at(row: NDArray[np.int64], column: NDArray[np.int64], inside: NDArray[np.bool_]) -> Floats:
         return np.where(inside & (state[row, column] == HIGH), height[row, column] / 100.0, np.nan)
@@ -228,11 +231,14 @@ def party_walls(profile: Profile | None, rule: WallRule, grid: Grid) -> list[Wal
 
 def _strength(profile: Profile, rule: WallRule) -> Floats:
     """Return the evidence of all marks for a wall before each station, m, shape (stations,)."""
+    if rule in profile.strengths:
+        return profile.strengths[rule]
     strength = np.zeros(profile.lattice.stations) if profile.roof is None else wall_strength(profile.roof, rule)
     if profile.colours is not None:
         strength += colour_strength(profile.colours, rule)
     if profile.rise is not None:
         strength += raised_strength(profile.rise, profile.chimneys, rule)
+    profile.strengths[rule] = strength
     return strength
 
 
