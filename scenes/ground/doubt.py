@@ -29,7 +29,7 @@ _Mask = NDArray[np.bool_]
 
 #: Metres, see above: a hall of 80 m width has its middle 40 m from the ground beside it.
 _FAR = 40.0
-#: Share of the cells in a square of `_FAR` metres that must be ground points: fewer do not tell streets from roofs.
+#: Share of the cells in a square of `_FAR` metres that must be ground points: fewer do not separate streets from roofs.
 _SCARCE = 0.05
 #: Share of the cells around a gap that must be ground points.
 _SURROUNDED = 0.5
