@@ -38,6 +38,9 @@ _Mask = NDArray[np.bool_]
 
 #: Size in metres of the blocks whose lowest heights give the trend.
 _TREND_BLOCK = 5.0
+#: Neighbourhoods of the rounds in which the trend is fitted, as shares of the largest object; fewer rounds where only
+#: land is left and nothing large need lose its weight.
+_SHARES, _SHARES_OF_LAND = (1.0, 1.0, 0.5, 0.5, 0.25, 0.25, 0.25), (1.0, 0.5, 0.25)
 #: Points put on the grid at a time, so that a large cloud is not copied.
 _CHUNK = 2_000_000
 #: Share of the scene under objects from which the trend is fitted again without them.
@@ -109,7 +112,8 @@ def filtered_ground(
     crowded = objects.cells.mean() > _CROWDED
     if crowded or objects.widest > (largest_object / 2) ** 2:
         # Roofs that cover most of a neighbourhood lift its trend: the trend of the rest is that of the land.
-        trend = _trend(np.where(objects.cells, np.float32(np.nan), lowest), grid.gsd, largest_object)
+        shares = _SHARES if crowded else _SHARES_OF_LAND
+        trend = _trend(np.where(objects.cells, np.float32(np.nan), lowest), grid.gsd, largest_object, shares)
         relief = lowest - trend
     if crowded:
         objects = objects_of(relief, grid.gsd, largest_object, slope, wall_height)
@@ -175,7 +179,7 @@ def _finite(points: PointCloud) -> tuple[NDArray[np.float64], NDArray[np.float64
     return points.x[finite], points.y[finite], points.z[finite]
 
 
-def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
+def _trend(surface: _Floats, cell: float, largest: float, shares: Sequence[float] = _SHARES) -> _Floats:
     """Return the coarse trend of the terrain: local planes, fitted to the low parts of a surface, on its grid.
 
     Locally weighted regression over ever smaller neighbourhoods; what lies above the trend counts less each round, so
@@ -191,7 +195,7 @@ def _trend(surface: _Floats, cell: float, largest: float) -> _Floats:
     height = np.where(known, low - base, 0)
     weight = known.astype(np.float64)
     trend = coarse = np.zeros(low.shape)
-    for share in (1.0, 1.0, 0.5, 0.5, 0.25, 0.25, 0.25):
+    for share in shares:
         trend = _local_planes(height, weight, share * largest / (cell * block))
         coarse = trend if share == 1.0 else coarse
         above = height - trend
