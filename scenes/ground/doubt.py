@@ -68,6 +68,16 @@ class Doubt:
             found |= part
         return found
 
+    def in_voids_of(self, dem: Elevation) -> Doubt:
+        """Return what remains where a terrain model has no height."""
+        row, column = np.indices(self.grid.shape)
+        x, y = self.grid.to_world(row.ravel() + 0.5, column.ravel() + 0.5)
+        index, inside = dem.grid.cells(x, y)
+        known = np.zeros(len(x), dtype=bool)
+        known[inside] = np.isfinite(dem.values.ravel()[index[inside]])
+        void = ~known.reshape(self.grid.shape)
+        return Doubt(self.grid, {reason: part & void for reason, part in self.reasons.items()})
+
     def note(self) -> str | None:
         """Return a note on the doubtful share of the scene, its largest places and the remedy; None if it is tiny."""
         import cv2

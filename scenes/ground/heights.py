@@ -102,7 +102,7 @@ def heights_of(
     """
     if dem is not None and _is_complete(dem, extent):
         return Heights(dem)
-    filtered, doubtful, doubts = None, None, []
+    filtered, doubt, doubtful, doubts = None, None, None, []
     if points is not None:
         filtered, doubt = filtered_ground(points, extent, cell=cell)
         doubtful, words = Elevation(doubt.cells.astype(np.float32), filtered.grid), doubt.note()
@@ -111,8 +111,7 @@ def heights_of(
         filtered = doubtful = None
     if dem is None:
         if filtered is not None:
-            notes = "there is no DEM: the ground was filtered from the points", *doubts
-            return Heights(filtered, notes, doubtful)
+            return Heights(filtered, ("there is no DEM: the ground was filtered from the points", *doubts), doubtful)
         grid = Grid.covering(extent, 1.0)
         level = Elevation(np.zeros(grid.shape, dtype=np.float32), grid)
         return Heights(level, ("there is neither a DEM nor a point: the ground was set to 0 m",))
@@ -128,13 +127,17 @@ def heights_of(
             (f"the DEM covers {_share(known)} of the scene, which has no points: the rest was interpolated",),
         )
     if not known.any():
-        notes = "the DEM has no value in the scene: the ground was filtered from the points", *doubts
-        return Heights(filtered, notes, doubtful)
+        none = "the DEM has no value in the scene: the ground was filtered from the points"
+        return Heights(filtered, (none, *doubts), doubtful)
     fill_voids(ground, known, filtered, grid)
-    return Heights(
-        Elevation(ground, grid),
-        (f"the DEM covers {_share(known)} of the scene: the ground of the rest was filtered from the points",),
+    notes: tuple[str, ...] = (
+        f"the DEM covers {_share(known)} of the scene: the ground of the rest was filtered from the points",
     )
+    if doubt is not None:
+        left = doubt.in_voids_of(Elevation(np.where(known, ground, np.float32(np.nan)), grid))
+        doubtful, words = Elevation(left.cells.astype(np.float32), left.grid), left.note()
+        notes = (*notes, words) if words else notes
+    return Heights(Elevation(ground, grid), notes, doubtful)
 
 
 def _is_complete(dem: Elevation, extent: Sequence[float]) -> bool:

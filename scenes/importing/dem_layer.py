@@ -13,6 +13,7 @@ from ..geodata.points import PointCloud
 from ..geodata.raster import Elevation
 from ..geodata.raster_headers import RasterHeader
 from ..geodata.raster_mosaic import mosaic_elevation, warped_extent
+from ..ground.doubt import Doubt
 from ..ground.filling import fill_unknown
 from ..ground.filter import elevation_from_points, filtered_ground
 from ..ground.heights import HIGHEST_LAND, LOWEST_LAND, SEAM, fill_voids
@@ -81,10 +82,13 @@ def _filled(
     known = np.isfinite(dem.values)
     away = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     if points is not None and float(away.max()) * dem.grid.gsd > SEAM:
-        ground, how, _ = _ground_of_points(place, points, None, ground_filter)
+        ground, how, doubt = _ground_of_points(place, points, None, ground_filter)
         if np.isfinite(ground.values).any():
             values = dem.values.copy()
             fill_voids(values, known, ground, dem.grid)
+            words = doubt.in_voids_of(dem).note() if doubt is not None else None
+            if words:
+                place.log.note(words)
             return values, f"were derived {how}"
     return fill_unknown(dem.values), "were interpolated"
 
@@ -103,15 +107,16 @@ def dem_of_points(place: Place, points: PointCloud, cell: float | None, ground_f
         return None
     how = place.log.derived["dem"] = f"{how}, at {dem.grid.gsd:g} m"
     place.log.note(f"the DEM was derived {how}")
-    if doubt:
-        place.log.note(doubt)
+    words = doubt.note() if doubt is not None else None
+    if words:
+        place.log.note(words)
     return dem
 
 
 def _ground_of_points(
     place: Place, points: PointCloud, cell: float | None, ground_filter: str | None
-) -> tuple[Elevation, str, str | None]:
-    """Return the bare earth that the points give, how it was derived, and a note on where it is unsure."""
+) -> tuple[Elevation, str, Doubt | None]:
+    """Return the bare earth that the points give, how it was derived, and where it is unsure."""
     classes = points.classification
     if ground_filter == "cloth":
         from ..ground.cloth import cloth_surface
@@ -122,7 +127,7 @@ def _ground_of_points(
         return dem, "from the points of classes 2 (ground) and 9 (water), gaps interpolated", None
     dem, doubt = filtered_ground(points, place.extent, cell=cell)
     why = ", since no point is classified as ground" if ground_filter is None else ""
-    return dem, f"by a ground filter (progressive opening){why}", doubt.note()
+    return dem, f"by a ground filter (progressive opening){why}", doubt
 
 
 def _compare_heights(place: Place, points: PointCloud, dem: Elevation, file: str) -> None:

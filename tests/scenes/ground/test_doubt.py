@@ -146,6 +146,19 @@ def test_the_note_names_the_largest_places_and_the_remedy():
     assert 30 <= column < 70
 
 
+def test_where_a_terrain_model_is_known_there_is_no_doubt():
+    y, x = np.mgrid[:240, :240] + 0.5
+    terrace = (abs(x - 120) < 40) & (abs(y - 120) < 30)
+    points = PointCloud(x.ravel(), y.ravel(), np.where(terrace, 9.0, 5.0).ravel())
+    for west, doubtful in ((0, False), (140, True)):
+        values = np.full((240, 240), 5.0, dtype=np.float32)
+        values[:, west : west + 10] = np.nan
+        values[:, west:] = np.nan if west else values[:, west:]
+        heights = heights_of(points, Elevation(values, Grid(0.0, 240.0, 1.0, 240, 240)), (0, 0, 240, 240))
+        assert (len(heights.notes) == 2) is doubtful
+        assert heights.doubtful.sample(np.array([150.0, 100.0]), np.array([120.0, 120.0])).tolist() == [doubtful, 0]
+
+
 def test_next_to_nothing_is_no_note():
     assert Doubt(GRID, {"because": NONE}).note() is None
     empty = Grid(0.0, 0.0, 1.0, 0, 0)
