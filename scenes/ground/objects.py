@@ -235,9 +235,11 @@ def _standing(
     leaning = border & (cv2.dilate(ringed.astype(np.uint8), square) > 0)
     each = (border & ~leaning, border & ~leaning & walls, border & ~leaning & steep, leaning, removed)
     length, walled, steeply, leans, size = (np.bincount(labels[cells], minlength=count) for cells in each)
-    leans = np.where((walled > 0) | (size * cell**2 < _CREST), leans, 0)
+    height = np.bincount(labels[removed], weights=above[removed], minlength=count) / np.maximum(size, 1)
+    # A low roof in the middle of a block leans on all sides.
+    enclosed = (length == 0) & (height >= _LOWEST_WIDE)
+    leans = np.where((walled > 0) | enclosed | (size * cell**2 < _CREST), leans, 0)
     stands = walled + leans >= _WALLED * np.maximum(length + leans, 1)
     stands &= steeply >= STEEP * walled
-    height = np.bincount(labels[removed], weights=above[removed], minlength=count) / np.maximum(size, 1)
     stands &= (height >= _LOWEST_WIDE) | (size * cell**2 < _TERRACE[0])
     return np.asarray(removed & stands[labels])
