@@ -8,8 +8,11 @@ ends, and they are about equally deep and beside each other: a lower wing is sel
 from __future__ import annotations
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 
 from .arrays import Floats, Rectangles
+from .rectangles import corners
 
 __all__ = ["runs_of"]
 
@@ -31,6 +34,7 @@ def runs_of(rectangles: Rectangles, cell: float) -> Rectangles:
     cell : float
         Metres.
     """
+    from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     one = np.asarray(rectangles, dtype=np.float64).reshape(-1, 5)
@@ -43,15 +47,18 @@ def runs_of(rectangles: Rectangles, cell: float) -> Rectangles:
     deep = np.concatenate([one[:, 3], one[:, 2]]) / 2
     place = np.concatenate([one[:, :2], one[:, :2]])
     way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    turn = np.abs((angle[:, None] - angle[None] + np.pi / 2) % np.pi - np.pi / 2)
-    apart = place[None] - place[:, None]
-    ahead = np.abs(np.einsum("ijk,ik->ij", apart, way))
-    aside = np.abs(apart[..., 1] * way[:, None, 0] - apart[..., 0] * way[:, None, 1])
-    meet = np.abs(ahead - along[:, None] - along[None]) * cell <= _APART
-    common = np.minimum(2 * np.minimum(deep[:, None], deep[None]), deep[:, None] + deep[None] - aside)
-    meet &= common >= _ALIKE * 2 * np.maximum(deep[:, None], deep[None])
-    meet &= turn <= np.radians(_STRAIGHT)
-    number, of = connected_components(meet & meet.T, directed=False)
+    i, j = _pairs(one, 2 * _APART / cell)
+    apart = place[j] - place[i]
+    turn = np.abs((angle[i] - angle[j] + np.pi / 2) % np.pi - np.pi / 2)
+    meet = turn <= np.radians(_STRAIGHT)
+    for side in (way[i], way[j]):
+        ahead = np.abs((apart * side).sum(axis=1))
+        aside = np.abs(apart[:, 1] * side[:, 0] - apart[:, 0] * side[:, 1])
+        common = np.minimum(2 * np.minimum(deep[i], deep[j]), deep[i] + deep[j] - aside)
+        meet &= np.abs(ahead - along[i] - along[j]) * cell <= _APART
+        meet &= common >= _ALIKE * 2 * np.maximum(deep[i], deep[j])
+    links = coo_matrix((np.ones(np.count_nonzero(meet), np.bool_), (i[meet], j[meet])), shape=(2 * count, 2 * count))
+    number, of = connected_components(links, directed=False)
     found = []
     for run in range(number):
         members = np.flatnonzero(of == run)
@@ -60,6 +67,18 @@ def runs_of(rectangles: Rectangles, cell: float) -> Rectangles:
     runs = np.array(found).reshape(-1, 5)
     deep = runs[:, 3] * cell
     return np.asarray(runs[(deep > 0) & (deep <= _DEEPEST) & (runs[:, 2] > runs[:, 3])])
+
+
+def _pairs(rectangles: Rectangles, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows of the sides of two rectangles at most some cells apart; the first rectangle is the earlier."""
+    outlines = shapely.polygons(corners(rectangles))
+    one, other = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=reach)
+    one, other = one[one < other], other[one < other]
+    count = len(rectangles)
+    return (
+        np.concatenate([one, one, one + count, one + count]),
+        np.concatenate([other, other + count, other, other + count]),
+    )
 
 
 def _around(place: Floats, angle: Floats, along: Floats, deep: Floats) -> Floats:

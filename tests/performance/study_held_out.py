@@ -1,8 +1,8 @@
 """Thresholds of mpp that need other scenes than airborne clouds, chosen without each place and scored on it.
 
 Run by hand: ``python tests/performance/study_held_out.py rasters --folders delft-s,ign-s``, the same with ``images``,
-``walls`` or ``clouds``. Folders are scenes with a reference, as for study_real.py. A place is a folder or a preset with
-all the scenes made from it: they are left out together.
+``walls`` or ``clouds``; ``kinds`` compares kinds of clouds. Folders are scenes with a reference, as for study_real.py.
+A place is a folder or a preset with all the scenes made from it: they are left out together.
 
 clouds
     The folders as they are.
@@ -205,14 +205,38 @@ def mean_of(qualities):
     return " / ".join(f"{value:.1f}" for value in np.mean(qualities, axis=0))
 
 
+def kinds(folders):
+    """Print the qualities on each cloud, its first returns without numbers, its raster, and that with the image."""
+    made = {
+        "cloud": lambda scene: with_points(scene, scene.points, None),
+        "first returns": lambda scene: with_points(scene, first_returns(scene).points, None),
+        "raster": rastered,
+        "raster and image": lambda scene: rastered(scene, scene.image),
+    }
+    print(f"\n| scene | detector | {' | '.join(made)} |\n|---|---|{'--:|' * len(made)}")
+    for name, scene in opened(folders).items():
+        for detector in ("mpp", "ndsm"):
+            cells = []
+            for kind, make in made.items():
+                if "image" in kind and (scene.image is None or not scene.image.is_colour):
+                    cells.append("")
+                    continue
+                other = make(scene)
+                cells.append(mean_of([scored(rb.detect(other, detector), other).numbers[:2]]))
+            print(f"| {name} | `{detector}` | {' | '.join(cells)} |", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("study", choices=tuple(THRESHOLDS))
+    parser.add_argument("study", choices=(*THRESHOLDS, "kinds"))
     parser.add_argument("--folders", default="", help="scene folders, by commas")
     parser.add_argument("--seeds", type=int, default=3, help="scenes of each preset")
     parser.add_argument("--threshold", default="", help="only those whose name contains this")
     options = parser.parse_args()
     folders = [folder for folder in options.folders.split(",") if Path(folder).name]
+    if options.study == "kinds":
+        kinds(folders)
+        return
     scenes = scenes_of(options.study, folders, options.seeds)
     print(f"<!-- {', '.join(scenes)} -->")
     print(

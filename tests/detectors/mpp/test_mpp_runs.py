@@ -1,5 +1,6 @@
 """Runs: rectangles end to end, and rows in which each house has a rectangle."""
 
+import itertools
 import math
 
 import numpy as np
@@ -105,3 +106,39 @@ def test_houses_with_a_rectangle_each_are_a_row_where_their_roofs_differ(step, b
 )
 def test_wings_and_sections_end_to_end_are_one_building(houses):
     assert len(levels(houses).buildings) == 1
+
+
+def meet(one, other):
+    """Whether two rectangles (x, y, half length, half depth, angle; metres) lie end to end, seen from both."""
+    turn = abs((one[4] - other[4] + math.pi / 2) % math.pi - math.pi / 2)
+    for angle in (one[4], other[4]):
+        east, south = other[0] - one[0], other[1] - one[1]
+        ahead = abs(east * math.cos(angle) + south * math.sin(angle))
+        aside = abs(south * math.cos(angle) - east * math.sin(angle))
+        common = min(2 * one[3], 2 * other[3], one[3] + other[3] - aside)
+        if abs(ahead - one[2] - other[2]) > 1.0 or common < 0.7 * 2 * max(one[3], other[3]):
+            return False
+    return turn <= math.radians(5)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_runs_are_the_connected_pairs_of_all_pairs(seed):
+    rng = np.random.default_rng(seed)
+    rectangles, ahead = [], 0.0
+    for _ in range(12):
+        wide, deep = rng.uniform(6, 12), rng.uniform(8, 11)
+        aside, apart = rng.uniform(-1.5, 1.5), rng.choice([-0.5, 0.0, 0.5, 1.5, 4.0])
+        rectangles.append([2 * (ahead + wide / 2), 2 * aside, 2 * wide, 2 * deep, rng.uniform(-0.06, 0.06)])
+        ahead += wide + apart
+    rectangles = rng.permutation(np.array(rectangles))
+    sides = [
+        (x / 2, y / 2, *halves, angle)
+        for x, y, a, b, angle in rectangles
+        for halves, angle in (((a / 4, b / 4), angle), ((b / 4, a / 4), angle + math.pi / 2))
+    ]
+    groups = [{k} for k in range(len(sides))]
+    for i, j in itertools.combinations(range(len(sides)), 2):
+        if i // 2 != j // 2 and meet(sides[i], sides[j]) and (pair := [g for g in groups if g & {i, j}])[1:]:
+            groups = [g for g in groups if g not in pair] + [pair[0] | pair[1]]
+    # Two houses together are longer than any is deep, so that no run is left out.
+    assert len(runs_of(rectangles, 0.5)) == sum(len(group) > 1 for group in groups)
