@@ -12,9 +12,8 @@ silent cue
     files in which every pulse has two returns give such cues: they would vote for one class everywhere.
 
 Roughness is measured from the coordinates alone, whatever the sensor records of a pulse: it is the *anchor*, which is
-never silent and by which the others are tested. Penetration is measured from the coordinates, too. On sparse clouds it
-knows more than roughness does, so it is not tested by it: it is silent only where it says one thing everywhere, or
-where the caller knows that nothing can be below a point (a raster has one height a cell).
+never silent and by which the others are tested. Penetration is measured from the coordinates, too, but first returns
+of dense crowns have as little of it as roofs.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ ANCHOR, PENETRATION, IMAGE = "roughness", "penetration", "image vegetation"
 _UNKNOWN = "it is not known of any high cell"
 #: Cues from coordinates, which are silent only where they are constant, and the share of cells within `_CONSTANT` of
 #: the median rating from which they are.
-_GEOMETRIC = frozenset({ANCHOR, PENETRATION})
+_GEOMETRIC = frozenset({ANCHOR})
 _CONSTANT_SHARE, _CONSTANT = 0.98, 0.1
 #: Least separation. Measured on five airborne clouds with and without their return numbers, and rastered: cues that
 #: help reach 0.33 to 1.8, those that mislead 0.2 at most. As far below 0, a cue says the opposite of the others: colour
@@ -104,7 +103,7 @@ def informative_cues(
         Reason by cue, of cues that cannot carry information.
     """
     ratings = {name: rating for name, rating in ratings.items() if name not in known_silent}
-    untested = _GEOMETRIC | set(independent)
+    untested = {ANCHOR} | set(independent)
     values = {name: rating[among] for name, rating in ratings.items()}
     silent = dict(known_silent)
     silent |= {name: _UNKNOWN for name, rating in values.items() if not np.isfinite(rating).any()}

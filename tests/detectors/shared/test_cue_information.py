@@ -72,10 +72,12 @@ def test_cells_that_are_not_high_do_not_count():
     assert informative_cues(ratings, high).used == (ANCHOR,)
 
 
-def test_penetration_is_not_tested_by_the_roughness_of_a_sparse_cloud():
-    """Roughness misleads where a window holds few points: on knox-small it contradicted penetration, and was wrong."""
-    ratings = {"penetration": rating(-0.8, 0.3), ANCHOR: rating(0.1, -0.2)}
-    assert informative_cues(ratings, HIGH).used == tuple(ratings)
+def test_penetration_that_says_of_crowns_what_it_says_of_roofs_is_silent():
+    """First returns of dense crowns have as few points below them as roofs have."""
+    ratings = {"penetration": rating(-0.9, -0.8), ANCHOR: rating(-0.6, 0.7)}
+    found = informative_cues(ratings, HIGH)
+    assert found.used == (ANCHOR,)
+    assert "does not separate" in found.silent["penetration"]
 
 
 def test_a_cue_that_cannot_know_is_silent_with_its_reason():
